@@ -1,0 +1,195 @@
+//! Scene files: TOML in, [`Scene`] out, and errors that say where.
+
+use crate::{
+    AoScale, Object, Scene,
+    bounded::{Albedo, Positive},
+    environment::EnvironmentFile,
+    generators::Shape,
+    view::{LookFile, MeasureFile},
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Why a scene cannot be used. The message names the file and the line or field.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// The TOML is malformed, has an unknown key, or a value out of its range.
+    #[error("{file}: {source}")]
+    Toml {
+        /// The scene file.
+        file: String,
+        /// What and where.
+        source: Box<toml::de::Error>,
+    },
+    /// Each value is legal, but they do not go together.
+    #[error("{file}: {message}")]
+    Invalid {
+        /// The scene file.
+        file: String,
+        /// What, by field.
+        message: String,
+    },
+    /// The file cannot be read.
+    #[error("{file}: cannot read the scene file: {source}")]
+    Read {
+        /// The scene file.
+        file: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// No built-in scene has this name.
+    #[error("no built-in scene is called '{name}'; there are: {known}")]
+    Unknown {
+        /// The name asked for.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+}
+
+/// A scene file.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SceneFile {
+    /// What the scene is for, in a sentence or two.
+    description: String,
+    /// A control: a scene where the methods under test should agree.
+    #[serde(default)]
+    control: bool,
+    /// The scale of ambient occlusion.
+    ao: AoFile,
+    /// The light.
+    environment: EnvironmentFile,
+    /// Where metrics are taken.
+    measure: MeasureFile,
+    /// Where pictures are taken.
+    look: LookFile,
+    /// The geometry.
+    #[serde(rename = "object")]
+    objects: Vec<ObjectFile>,
+}
+
+/// `[ao]`: the scale of ambient occlusion.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct AoFile {
+    /// R, length of a primary ray, metres.
+    radius: Positive,
+    /// R', half length of a secondary ray, metres; R/4 unless given.
+    secondary_radius: Option<Positive>,
+}
+
+/// `[[object]]`: one shape with its material.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct ObjectFile {
+    /// Unique in the scene.
+    name: String,
+    /// The occluder under judgement: taken away in the twin.
+    #[serde(default)]
+    occluder: bool,
+    /// Diffuse albedo; 0.6 unless given.
+    albedo: Option<Albedo>,
+    /// What it looks like.
+    shape: Shape,
+}
+
+impl SceneFile {
+    fn build(self, name: &str) -> Result<Scene, String> {
+        let mut objects = Vec::with_capacity(self.objects.len());
+        for o in self.objects {
+            if objects.iter().any(|b: &Object| b.name == o.name) {
+                return Err(format!("two objects are called '{}'", o.name));
+            }
+            let mesh = o
+                .shape
+                .mesh()
+                .map_err(|e| format!("object '{}': {e}", o.name))?;
+            mesh.validate()
+                .map_err(|e| format!("object '{}': {e}", o.name))?;
+            objects.push(Object {
+                name: o.name,
+                occluder: o.occluder,
+                albedo: o.albedo.map_or(0.6, |a| a.0),
+                mesh,
+            });
+        }
+        if objects.iter().all(|o| o.occluder) {
+            return Err(
+                "the scene has no receiver: give at least one object that is not an occluder"
+                    .into(),
+            );
+        }
+        let radius = self.ao.radius.0;
+        Ok(Scene {
+            name: name.to_owned(),
+            description: self.description,
+            control: self.control,
+            ao: AoScale {
+                radius,
+                secondary_radius: self.ao.secondary_radius.map_or(radius / 4.0, |r| r.0),
+            },
+            environment: self.environment.build()?,
+            measure: self.measure.build(radius)?,
+            look: self.look.build()?,
+            objects,
+        })
+    }
+}
+
+impl Scene {
+    /// Reads a scene from TOML. `file` is what errors call it.
+    ///
+    /// # Errors
+    /// [`SceneError::Toml`] with line and column for anything one value gets
+    /// wrong, [`SceneError::Invalid`] where values do not go together.
+    ///
+    /// # Example
+    /// ```
+    /// let toml = r#"
+    /// description = "An open plane."
+    /// ao = { radius = 0.25 }
+    /// environment = { radiance = 1.0 }
+    /// measure = { center = [0, 0, 0], normal = [0, 1, 0], transect = [1, 0, 0], clearance = 0.1, resolution = [96, 64] }
+    /// look = { eye = [1, 1, 1], target = [0, 0, 0], resolution = [96, 64] }
+    /// [[object]]
+    /// name = "floor"
+    /// shape = { plane = { center = [0, 0, 0], u = [0, 0, 4], v = [4, 0, 0] } }
+    /// "#;
+    /// let scene = aogauge_scenes::Scene::from_toml("plane", "plane.toml", toml)?;
+    /// assert_eq!(scene.ao.secondary_radius, 0.0625);
+    /// # Ok::<(), aogauge_scenes::SceneError>(())
+    /// ```
+    pub fn from_toml(name: &str, file: &str, text: &str) -> Result<Scene, SceneError> {
+        let parsed: SceneFile = toml::from_str(text).map_err(|e| SceneError::Toml {
+            file: file.to_owned(),
+            source: Box::new(e),
+        })?;
+        parsed.build(name).map_err(|message| SceneError::Invalid {
+            file: file.to_owned(),
+            message,
+        })
+    }
+
+    /// Reads a scene file; its name is the file's, without the ending.
+    ///
+    /// # Errors
+    /// [`SceneError::Read`] where the file cannot be read, else as
+    /// [`Scene::from_toml`].
+    pub fn from_file(path: &std::path::Path) -> Result<Scene, SceneError> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read {
+            file: file.clone(),
+            source,
+        })?;
+        let name = path
+            .file_stem()
+            .map_or_else(|| file.clone(), |s| s.to_string_lossy().into_owned());
+        Scene::from_toml(&name, &file, &text)
+    }
+
+    /// The JSON Schema of scene files.
+    pub fn file_schema() -> schemars::Schema {
+        schemars::schema_for!(SceneFile)
+    }
+}

@@ -1,0 +1,29 @@
+//! A rectangle: open ground, a wall.
+
+use crate::{Mesh, bounded::Triple};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The parallelogram `center +- u/2 +- v/2`, facing `u x v`.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Plane {
+    /// Its middle, metres.
+    pub center: Triple,
+    /// One edge vector, metres.
+    pub u: Triple,
+    /// The other edge vector, metres.
+    pub v: Triple,
+}
+
+impl Plane {
+    pub(crate) fn mesh(&self) -> Result<Mesh, String> {
+        let (u, v) = (self.u.vec(), self.v.vec());
+        if u.cross(v).length() <= 0.0 {
+            return Err("plane: u and v must not be parallel or zero".into());
+        }
+        let mut mesh = Mesh::default();
+        mesh.push_quad(self.center.vec() - u / 2.0 - v / 2.0, u, v);
+        Ok(mesh)
+    }
+}

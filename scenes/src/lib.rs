@@ -1,0 +1,25 @@
+//! Scenes that provoke thin-occluder errors in ambient occlusion, their
+//! controls, and the light they stand in.
+//!
+//! This crate knows geometry and light only: it traces no ray and renders no
+//! picture. A [`Scene`] is read from TOML ([`Scene::from_toml`]) or taken from
+//! the built-in [`library`]; [`Scene::twin`] is the same scene with the occluder
+//! under judgement taken away.
+//!
+//! Units are metres and linear radiance; axes are right-handed with +Y up and
+//! -Z forward, as in glTF.
+
+mod bounded;
+mod environment;
+mod file;
+pub mod generators;
+pub mod library;
+mod mesh;
+mod scene;
+mod view;
+
+pub use environment::{Environment, Portal};
+pub use file::SceneError;
+pub use mesh::Mesh;
+pub use scene::{AoScale, Object, Scene};
+pub use view::{LookView, MeasureView, View};

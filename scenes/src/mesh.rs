@@ -1,0 +1,173 @@
+//! Indexed triangles, and nothing else.
+
+use glam::Vec3;
+
+/// Indexed triangles in metres; counter-clockwise seen from outside.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// Vertex positions, metres.
+    pub positions: Vec<Vec3>,
+    /// Three indices into `positions` a triangle.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// Why a list of vertices and indices is no mesh.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum MeshError {
+    /// A vertex has a coordinate that is not a finite number.
+    #[error("vertex {vertex} is {position:?}: coordinates must be finite numbers")]
+    NotFinite {
+        /// Index of the vertex.
+        vertex: usize,
+        /// Its coordinates as given.
+        position: [f32; 3],
+    },
+    /// A triangle names a vertex that does not exist.
+    #[error("triangle {triangle} names vertex {index}, but there are only {vertices} (0 to {last})", last = vertices.saturating_sub(1))]
+    OutOfRange {
+        /// Index of the triangle.
+        triangle: usize,
+        /// The vertex index it names.
+        index: u32,
+        /// How many vertices there are.
+        vertices: usize,
+    },
+    /// There is nothing to trace.
+    #[error("the mesh has no triangles")]
+    Empty,
+}
+
+impl Mesh {
+    /// Adds the parallelogram `corner`, `corner + u`, `corner + u + v`,
+    /// `corner + v`; its normal points along `u x v`.
+    pub fn push_quad(&mut self, corner: Vec3, u: Vec3, v: Vec3) {
+        self.push_corners([corner, corner + u, corner + u + v, corner + v]);
+    }
+
+    /// Adds a quadrilateral by its corners in counter-clockwise order. Shells
+    /// pass the same corner values to neighbours, so that shared edges are
+    /// shared to the last bit and no ray slips between.
+    pub fn push_corners(&mut self, corners: [Vec3; 4]) {
+        let base = self.positions.len() as u32;
+        self.positions.extend(corners);
+        self.triangles.push([base, base + 1, base + 2]);
+        self.triangles.push([base, base + 2, base + 3]);
+    }
+
+    /// Adds a closed, axis-aligned box: eight shared vertices, twelve triangles,
+    /// normals outward.
+    pub fn push_box(&mut self, min: Vec3, max: Vec3) {
+        let base = self.positions.len() as u32;
+        for corner in 0..8u32 {
+            self.positions.push(Vec3::new(
+                if corner & 1 == 0 { min.x } else { max.x },
+                if corner & 2 == 0 { min.y } else { max.y },
+                if corner & 4 == 0 { min.z } else { max.z },
+            ));
+        }
+        const FACES: [[u32; 4]; 6] = [
+            [0, 4, 6, 2], // -x
+            [1, 3, 7, 5], // +x
+            [0, 1, 5, 4], // -y
+            [2, 6, 7, 3], // +y
+            [0, 2, 3, 1], // -z
+            [4, 5, 7, 6], // +z
+        ];
+        for [a, b, c, d] in FACES {
+            self.triangles.push([base + a, base + b, base + c]);
+            self.triangles.push([base + a, base + c, base + d]);
+        }
+    }
+
+    /// The corner positions of every triangle, in order.
+    pub fn corners(&self) -> impl Iterator<Item = [Vec3; 3]> + '_ {
+        self.triangles
+            .iter()
+            .map(|t| t.map(|i| self.positions[i as usize]))
+    }
+
+    /// Checks that every coordinate is finite and every index in range.
+    ///
+    /// # Errors
+    /// The first vertex or triangle that is wrong.
+    pub fn validate(&self) -> Result<(), MeshError> {
+        if let Some((vertex, p)) = self
+            .positions
+            .iter()
+            .enumerate()
+            .find(|(_, p)| !p.is_finite())
+        {
+            return Err(MeshError::NotFinite {
+                vertex,
+                position: p.to_array(),
+            });
+        }
+        let vertices = self.positions.len();
+        for (triangle, indices) in self.triangles.iter().enumerate() {
+            if let Some(&index) = indices.iter().find(|&&i| i as usize >= vertices) {
+                return Err(MeshError::OutOfRange {
+                    triangle,
+                    index,
+                    vertices,
+                });
+            }
+        }
+        if self.triangles.is_empty() {
+            return Err(MeshError::Empty);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashMap;
+
+    #[test]
+    fn a_box_is_closed_and_its_normals_point_outward() {
+        let mut mesh = Mesh::default();
+        mesh.push_box(Vec3::new(-1.0, 0.0, 2.0), Vec3::new(1.0, 0.5, 4.0));
+        let centre = Vec3::new(0.0, 0.25, 3.0);
+        let mut edges: HashMap<(u32, u32), i32> = HashMap::new();
+        for t in &mesh.triangles {
+            for k in 0..3 {
+                let (a, b) = (t[k], t[(k + 1) % 3]);
+                *edges.entry((a.min(b), a.max(b))).or_default() += if a < b { 1 } else { -1 };
+            }
+        }
+        assert_eq!(edges.len(), 18);
+        assert!(
+            edges.values().all(|&n| n == 0),
+            "every edge is walked once each way"
+        );
+        for [a, b, c] in mesh.corners() {
+            let normal = (b - a).cross(c - a);
+            assert!(normal.length() > 0.0);
+            assert!(normal.dot((a + b + c) / 3.0 - centre) > 0.0);
+        }
+    }
+
+    #[test]
+    fn bad_meshes_are_named() {
+        let mut mesh = Mesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(0.0, f32::NAN, 0.0)],
+            triangles: vec![[0, 1, 2]],
+        };
+        assert!(
+            mesh.validate()
+                .unwrap_err()
+                .to_string()
+                .contains("vertex 2")
+        );
+        mesh.positions[2] = Vec3::Y;
+        assert_eq!(mesh.validate(), Ok(()));
+        mesh.triangles.push([0, 1, 3]);
+        assert!(
+            mesh.validate()
+                .unwrap_err()
+                .to_string()
+                .contains("vertex 3")
+        );
+    }
+}

@@ -1,0 +1,110 @@
+//! A scene: objects, light, scale and views.
+
+use crate::{Environment, LookView, MeasureView, Mesh};
+use glam::Vec3;
+use sha2::{Digest, Sha256};
+
+/// The scale on which ambient occlusion looks at a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AoScale {
+    /// R: length of a primary ray, metres.
+    pub radius: f32,
+    /// R': half length of a secondary ray, metres.
+    pub secondary_radius: f32,
+}
+
+/// A named mesh with its material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Object {
+    /// Unique in its scene.
+    pub name: String,
+    /// Whether this is (part of) the occluder under judgement.
+    pub occluder: bool,
+    /// Diffuse albedo, 0 up to but not including 1.
+    pub albedo: f32,
+    /// The triangles.
+    pub mesh: Mesh,
+}
+
+/// Everything a renderer needs to know.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// Unique in a suite.
+    pub name: String,
+    /// What it is for.
+    pub description: String,
+    /// Whether it is a control, where the methods under test should agree.
+    pub control: bool,
+    /// R and R'.
+    pub ao: AoScale,
+    /// The light.
+    pub environment: Environment,
+    /// Where metrics and goldens are taken.
+    pub measure: MeasureView,
+    /// Where pictures are taken.
+    pub look: LookView,
+    /// The geometry; at least one object is no occluder.
+    pub objects: Vec<Object>,
+}
+
+impl Scene {
+    /// Whether there is an occluder to judge.
+    pub fn has_occluder(&self) -> bool {
+        self.objects.iter().any(|o| o.occluder)
+    }
+
+    /// The same scene with the occluder under judgement taken away.
+    #[must_use]
+    pub fn twin(&self) -> Scene {
+        let mut twin = self.clone();
+        twin.objects.retain(|o| !o.occluder);
+        twin
+    }
+
+    /// All triangles in object order, each with the index of its object.
+    pub fn triangles(&self) -> impl Iterator<Item = (usize, [Vec3; 3])> + '_ {
+        self.objects
+            .iter()
+            .enumerate()
+            .flat_map(|(i, o)| o.mesh.corners().map(move |t| (i, t)))
+    }
+
+    /// Content hash (SHA-256, hex) of everything that can change a measurement:
+    /// geometry, materials, light, scale, measure view. Names, descriptions and
+    /// the look view do not count.
+    pub fn hash(&self) -> String {
+        let mut sha = Sha256::new();
+        let mut floats = |values: &[f32]| {
+            for v in values {
+                sha.update(v.to_bits().to_le_bytes());
+            }
+        };
+        floats(&[
+            self.ao.radius,
+            self.ao.secondary_radius,
+            self.environment.radiance,
+        ]);
+        for p in &self.environment.portals {
+            for v in [p.corner, p.u, p.v] {
+                floats(&v.to_array());
+            }
+        }
+        let m = &self.measure;
+        for v in [m.center, m.normal, m.transect] {
+            floats(&v.to_array());
+        }
+        floats(&[m.clearance, m.pixel]);
+        for o in &self.objects {
+            floats(&[o.albedo, f32::from(u8::from(o.occluder))]);
+            for corners in o.mesh.corners() {
+                for v in corners {
+                    floats(&v.to_array());
+                }
+            }
+        }
+        for n in m.resolution {
+            sha.update(n.to_le_bytes());
+        }
+        sha.finalize().iter().map(|b| format!("{b:02x}")).collect()
+    }
+}

@@ -1,0 +1,264 @@
+//! Where a scene is measured from, and where its pictures are taken.
+
+use crate::bounded::{Positive, Triple};
+use glam::Vec3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A camera as two affine maps: the ray of the image point (x, y), in pixels
+/// from the top left corner, starts at `origin + x origin_dx + y origin_dy` and
+/// points along `direction + x direction_dx + y direction_dy` (not normalised).
+///
+/// One form serves orthographic and perspective views, on the CPU and the GPU.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Width and height in pixels.
+    pub resolution: [u32; 2],
+    /// Ray origin at the top left corner.
+    pub origin: Vec3,
+    /// Its change from one column to the next.
+    pub origin_dx: Vec3,
+    /// Its change from one row to the next.
+    pub origin_dy: Vec3,
+    /// Ray direction at the top left corner.
+    pub direction: Vec3,
+    /// Its change from one column to the next.
+    pub direction_dx: Vec3,
+    /// Its change from one row to the next.
+    pub direction_dy: Vec3,
+}
+
+impl View {
+    /// Number of pixels.
+    pub fn pixels(&self) -> usize {
+        self.resolution[0] as usize * self.resolution[1] as usize
+    }
+
+    /// Origin and unit direction of the ray through the centre of a pixel.
+    pub fn ray(&self, x: u32, y: u32) -> (Vec3, Vec3) {
+        let (x, y) = (x as f32 + 0.5, y as f32 + 0.5);
+        (
+            self.origin + self.origin_dx * x + self.origin_dy * y,
+            (self.direction + self.direction_dx * x + self.direction_dy * y).normalize(),
+        )
+    }
+}
+
+/// The view that metrics and goldens are taken from: orthographic, between the
+/// receiver and the occluder, looking along the receiver's inward normal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeasureView {
+    /// The point of the receiver at the centre of the image.
+    pub center: Vec3,
+    /// Unit normal of the receiver.
+    pub normal: Vec3,
+    /// Unit direction of the transect; the image's x axis. Its negative side is
+    /// the left flank.
+    pub transect: Vec3,
+    /// Height of the near plane over the receiver, metres: under the occluder.
+    pub clearance: f32,
+    /// Edge of a square pixel, metres.
+    pub pixel: f32,
+    /// Width and height in pixels.
+    pub resolution: [u32; 2],
+}
+
+impl MeasureView {
+    /// As a camera.
+    pub fn view(&self) -> View {
+        let up = self.normal.cross(self.transect);
+        let [w, h] = self.resolution;
+        let (dx, dy) = (self.transect * self.pixel, -up * self.pixel);
+        View {
+            resolution: self.resolution,
+            origin: self.center + self.normal * self.clearance
+                - dx * (w as f32 / 2.0)
+                - dy * (h as f32 / 2.0),
+            origin_dx: dx,
+            origin_dy: dy,
+            direction: -self.normal,
+            direction_dx: Vec3::ZERO,
+            direction_dy: Vec3::ZERO,
+        }
+    }
+
+    /// Coordinate of column `x`'s pixel centres along the transect, metres from
+    /// the centre of the image.
+    pub fn transect_at(&self, x: u32) -> f32 {
+        (x as f32 + 0.5 - self.resolution[0] as f32 / 2.0) * self.pixel
+    }
+}
+
+/// The view that pictures are taken from: a perspective camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LookView {
+    /// Position of the camera.
+    pub eye: Vec3,
+    /// The point at the centre of the image.
+    pub target: Vec3,
+    /// Vertical field of view, degrees.
+    pub fov: f32,
+    /// Width and height in pixels.
+    pub resolution: [u32; 2],
+}
+
+impl LookView {
+    /// As a camera, +Y up.
+    pub fn view(&self) -> View {
+        let forward = (self.target - self.eye).normalize();
+        let right = forward.cross(Vec3::Y).normalize();
+        let up = right.cross(forward);
+        let [w, h] = self.resolution;
+        let pixel = 2.0 * (self.fov.to_radians() / 2.0).tan() / h as f32;
+        let (dx, dy) = (right * pixel, -up * pixel);
+        View {
+            resolution: self.resolution,
+            origin: self.eye,
+            origin_dx: Vec3::ZERO,
+            origin_dy: Vec3::ZERO,
+            direction: forward - dx * (w as f32 / 2.0) - dy * (h as f32 / 2.0),
+            direction_dx: dx,
+            direction_dy: dy,
+        }
+    }
+}
+
+/// Width and height in pixels, each 16 to 4096.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+#[serde(transparent)]
+struct Resolution([u32; 2]);
+
+impl<'de> Deserialize<'de> for Resolution {
+    fn deserialize<D: serde::Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        let [w, h] = <[u32; 2]>::deserialize(d)?;
+        if [w, h].iter().any(|v| !(16..=4096).contains(v)) {
+            return Err(serde::de::Error::custom(format!(
+                "a resolution of {w} x {h} is out of range: 16 to 4096 pixels each way"
+            )));
+        }
+        Ok(Self([w, h]))
+    }
+}
+
+/// `[measure]` of a scene file.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct MeasureFile {
+    /// The point of the receiver at the centre of the image, metres.
+    center: Triple,
+    /// Normal of the receiver, towards the occluder.
+    normal: Triple,
+    /// Direction across the occluder, along the receiver.
+    transect: Triple,
+    /// Height of the near plane over the receiver, metres: under the occluder.
+    clearance: Positive,
+    /// Edge of a pixel, metres; R/50 unless given, and no larger.
+    pixel: Option<Positive>,
+    /// Width and height in pixels.
+    resolution: Resolution,
+}
+
+impl MeasureFile {
+    pub(crate) fn build(&self, radius: f32) -> Result<MeasureView, String> {
+        let normal = unit(self.normal.vec(), "measure.normal")?;
+        let transect = unit(self.transect.vec(), "measure.transect")?;
+        if normal.dot(transect).abs() > 1e-4 {
+            return Err("measure.transect must be perpendicular to measure.normal".into());
+        }
+        let pixel = self.pixel.map_or(radius / 50.0, |p| p.0);
+        if pixel > radius / 50.0 * 1.0001 {
+            return Err(format!(
+                "measure.pixel is {pixel} m: it must be no larger than ao.radius / 50 = {} m",
+                radius / 50.0
+            ));
+        }
+        Ok(MeasureView {
+            center: self.center.vec(),
+            normal,
+            transect,
+            clearance: self.clearance.0,
+            pixel,
+            resolution: self.resolution.0,
+        })
+    }
+}
+
+/// `[look]` of a scene file.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct LookFile {
+    /// Position of the camera, metres.
+    eye: Triple,
+    /// The point at the centre of the image, metres.
+    target: Triple,
+    /// Vertical field of view, degrees; 45 unless given.
+    fov: Option<Positive>,
+    /// Width and height in pixels.
+    resolution: Resolution,
+}
+
+impl LookFile {
+    pub(crate) fn build(&self) -> Result<LookView, String> {
+        let (eye, target) = (self.eye.vec(), self.target.vec());
+        let forward = unit(target - eye, "look.target - look.eye")?;
+        if forward.cross(Vec3::Y).length() < 1e-3 {
+            return Err("look: the camera must not look straight up or down".into());
+        }
+        let fov = self.fov.map_or(45.0, |f| f.0);
+        if fov >= 170.0 {
+            return Err(format!("look.fov is {fov}: it must be below 170 degrees"));
+        }
+        Ok(LookView {
+            eye,
+            target,
+            fov,
+            resolution: self.resolution.0,
+        })
+    }
+}
+
+fn unit(v: Vec3, field: &str) -> Result<Vec3, String> {
+    v.try_normalize()
+        .ok_or_else(|| format!("{field} is the zero vector: it must have a direction"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_measure_view_looks_down_at_its_centre() {
+        let measure = MeasureView {
+            center: Vec3::new(1.0, 0.0, 2.0),
+            normal: Vec3::Y,
+            transect: Vec3::X,
+            clearance: 0.05,
+            pixel: 0.01,
+            resolution: [32, 16],
+        };
+        let view = measure.view();
+        let (a, d) = view.ray(0, 0);
+        let (b, _) = view.ray(31, 15);
+        assert!(((a + b) / 2.0 - Vec3::new(1.0, 0.05, 2.0)).length() < 1e-6);
+        assert_eq!(d, Vec3::NEG_Y);
+        assert!((a.x - 1.0 - measure.transect_at(0)).abs() < 1e-6);
+        assert!(measure.transect_at(0) < 0.0);
+    }
+
+    #[test]
+    fn the_look_view_meets_its_target_at_the_image_centre() {
+        let look = LookView {
+            eye: Vec3::new(0.0, 1.0, 3.0),
+            target: Vec3::new(0.5, 0.2, -1.0),
+            fov: 40.0,
+            resolution: [64, 48],
+        };
+        let view = look.view();
+        let (_, a) = view.ray(31, 23);
+        let (_, b) = view.ray(32, 24);
+        let forward = (look.target - look.eye).normalize();
+        assert!(((a + b).normalize() - forward).length() < 1e-6);
+        let (_, top) = view.ray(32, 0);
+        assert!(top.y > b.y, "the first row is the top one");
+    }
+}

@@ -1,0 +1,430 @@
+//! The one place that meets triangles on the CPU: a BVH, any-hit, closest hit and
+//! closest point.
+//!
+//! The tree is obvhs's `Bvh2`; its traversal is our own, because the library's
+//! triangle test is not watertight and its any-hit has an absolute epsilon. Boxes
+//! are padded by the rounding error of the scene, so that no box hides a triangle
+//! that the triangle test would meet. The same nodes and triangles go to the GPU.
+
+mod triangle;
+
+pub use triangle::Ray;
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Vec3, Vec3A};
+use obvhs::{BvhBuildParams, bvh2::builder::build_bvh2_from_tris, triangle::Triangle};
+use std::time::Duration;
+
+/// A node of the tree, 32 bytes, the same on the CPU and the GPU.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(16))]
+pub struct Node {
+    /// Smallest corner of the box, metres.
+    pub min: [f32; 3],
+    /// Inner node: index of the first of two neighbouring children. Leaf: index
+    /// of its first triangle.
+    pub first: u32,
+    /// Largest corner of the box, metres.
+    pub max: [f32; 3],
+    /// Number of triangles; 0 for an inner node.
+    pub count: u32,
+}
+
+/// The deepest tree we walk: the length of the traversal stack.
+pub const STACK: usize = 64;
+
+/// Why a tree could not be built.
+#[derive(Debug, thiserror::Error)]
+pub enum TraceError {
+    /// The traversal stack would overflow.
+    #[error(
+        "the BVH is {depth} levels deep, but traversal holds {STACK}: the mesh has too many triangles in one place"
+    )]
+    TooDeep {
+        /// Levels of the tree.
+        depth: usize,
+    },
+}
+
+/// The nearest triangle along a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance, metres.
+    pub t: f32,
+    /// The triangle, as it was numbered when the tracer was built.
+    pub triangle: u32,
+    /// The point, interpolated from the corners.
+    pub point: Vec3,
+    /// Unit geometric normal, turned against the ray.
+    pub normal: Vec3,
+}
+
+/// Triangles in a tree.
+#[derive(Clone, Debug)]
+pub struct Tracer {
+    nodes: Vec<Node>,
+    triangles: Vec<[Vec3; 3]>,
+    source: Vec<u32>,
+    offset: f32,
+}
+
+/// Slab test against a padded box, widened by the rounding error of the three
+/// operations (Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013). Returns the
+/// entry distance, infinity for a miss.
+#[inline]
+fn enter(node: &Node, origin: Vec3A, inverse: Vec3A, tmax: f32) -> f32 {
+    let raw: &[f32; 8] = bytemuck::cast_ref(node);
+    let lo = (Vec3A::new(raw[0], raw[1], raw[2]) - origin) * inverse;
+    let hi = (Vec3A::new(raw[4], raw[5], raw[6]) - origin) * inverse;
+    let near = lo.min(hi).max_element().max(0.0);
+    let far = lo.max(hi).min_element().min(tmax);
+    if near <= far * 1.000_000_4 {
+        near
+    } else {
+        f32::INFINITY
+    }
+}
+
+impl Tracer {
+    /// Builds the tree. The triangles must be finite.
+    ///
+    /// # Errors
+    /// [`TraceError::TooDeep`] on meshes with very many triangles in one place.
+    pub fn new(triangles: &[[Vec3; 3]]) -> Result<Self, TraceError> {
+        let input: Vec<Triangle> = triangles
+            .iter()
+            .map(|[a, b, c]| Triangle {
+                v0: (*a).into(),
+                v1: (*b).into(),
+                v2: (*c).into(),
+            })
+            .collect();
+        // medium_build does not pre-split, so primitive_indices is a permutation.
+        let bvh = build_bvh2_from_tris(
+            &input,
+            BvhBuildParams::medium_build(),
+            &mut Duration::default(),
+        );
+        let magnitude = triangles
+            .iter()
+            .flatten()
+            .fold(0.0f32, |m, v| m.max(v.abs().max_element()));
+        let pad = magnitude * 2.0f32.powi(-22);
+        let nodes: Vec<Node> = bvh
+            .nodes
+            .iter()
+            .map(|n| Node {
+                min: (Vec3::from(n.aabb.min) - pad).to_array(),
+                first: n.first_index,
+                max: (Vec3::from(n.aabb.max) + pad).to_array(),
+                count: n.prim_count,
+            })
+            .collect();
+        let depth = depth(&nodes);
+        if depth > STACK {
+            return Err(TraceError::TooDeep { depth });
+        }
+        let source = bvh.primitive_indices;
+        Ok(Tracer {
+            nodes,
+            triangles: source.iter().map(|&i| triangles[i as usize]).collect(),
+            source,
+            offset: magnitude * 2.0f32.powi(-19),
+        })
+    }
+
+    /// The nodes; the root is the first.
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    /// The triangles in leaf order.
+    pub fn triangles(&self) -> &[[Vec3; 3]] {
+        &self.triangles
+    }
+
+    /// How each triangle of [`Self::triangles`] was numbered when the tracer was
+    /// built.
+    pub fn source(&self) -> &[u32] {
+        &self.source
+    }
+
+    /// How far ray origins are pushed off a surface, along its normal, metres.
+    ///
+    /// A bound on the rounding error, after Wächter and Binder (Ray Tracing Gems,
+    /// chapter 6): 2^-19, 32 rounding units, of the largest coordinate in the
+    /// scene. Their offset scales with the coordinates of the point itself, but
+    /// the error here comes from the corners of whatever large triangle shares
+    /// the plane, and near the origin theirs becomes a constant, which a scene
+    /// scaled to 1/100 would see.
+    pub fn offset(&self) -> f32 {
+        self.offset
+    }
+
+    /// Whether anything lies on the ray within `(0, tmax]`.
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        self.walk(ray, ray.tmax, |triangle, tmax| {
+            if ray.meets(&self.triangles[triangle], tmax).is_some() {
+                None
+            } else {
+                Some(tmax)
+            }
+        })
+    }
+
+    /// The nearest triangle on the ray within `(0, tmax]`.
+    pub fn closest(&self, ray: &Ray) -> Option<Hit> {
+        let mut best: Option<(f32, usize, Vec3)> = None;
+        self.walk(ray, ray.tmax, |triangle, tmax| {
+            if let Some((t, weights)) = ray.meets(&self.triangles[triangle], tmax) {
+                best = Some((t, triangle, weights));
+                return Some(t);
+            }
+            Some(tmax)
+        });
+        best.map(|(t, triangle, w)| {
+            let [a, b, c] = self.triangles[triangle];
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            Hit {
+                t,
+                triangle: self.source[triangle],
+                point: a * w.x + b * w.y + c * w.z,
+                normal: if normal.dot(ray.direction) > 0.0 {
+                    -normal
+                } else {
+                    normal
+                },
+            }
+        })
+    }
+
+    /// Walks the tree along a ray, nearer child first. `test` takes a triangle
+    /// and how far to look, and returns how far to look from there on, or None to
+    /// stop; the walk returns whether it was stopped.
+    #[inline(always)]
+    fn walk(&self, ray: &Ray, tmax: f32, mut test: impl FnMut(usize, f32) -> Option<f32>) -> bool {
+        let origin = Vec3A::from(ray.origin);
+        let inverse = Vec3A::from(ray.inverse);
+        let mut tmax = tmax;
+        let mut stack = [0u32; STACK];
+        let mut height = 0;
+        let Some(root) = self.nodes.first() else {
+            return false;
+        };
+        if enter(root, origin, inverse, tmax) == f32::INFINITY {
+            return false;
+        }
+        let mut node = root;
+        loop {
+            if node.count > 0 {
+                for triangle in node.first..node.first + node.count {
+                    match test(triangle as usize, tmax) {
+                        Some(t) => tmax = t,
+                        None => return true,
+                    }
+                }
+            } else {
+                let first = node.first as usize;
+                let (mut near, mut far) = (&self.nodes[first], &self.nodes[first + 1]);
+                let (mut t_near, mut t_far) = (
+                    enter(near, origin, inverse, tmax),
+                    enter(far, origin, inverse, tmax),
+                );
+                let mut far_index = first + 1;
+                if t_far < t_near {
+                    std::mem::swap(&mut near, &mut far);
+                    std::mem::swap(&mut t_near, &mut t_far);
+                    far_index = first;
+                }
+                if t_far < f32::INFINITY {
+                    stack[height] = far_index as u32;
+                    height += 1;
+                }
+                if t_near < f32::INFINITY {
+                    node = near;
+                    continue;
+                }
+            }
+            if height == 0 {
+                return false;
+            }
+            height -= 1;
+            node = &self.nodes[stack[height] as usize];
+        }
+    }
+
+    /// Distance from a point to the nearest triangle that `accept` takes (by its
+    /// corners), or None where there is none within `radius`.
+    pub fn nearest(
+        &self,
+        point: Vec3,
+        radius: f32,
+        accept: impl Fn(&[Vec3; 3]) -> bool,
+    ) -> Option<f32> {
+        let mut best = radius * radius;
+        let mut found = false;
+        let mut stack: Vec<u32> = if self.nodes.is_empty() {
+            vec![]
+        } else {
+            vec![0]
+        };
+        while let Some(index) = stack.pop() {
+            let node = &self.nodes[index as usize];
+            let nearest = point.clamp(Vec3::from(node.min), Vec3::from(node.max));
+            if (nearest - point).length_squared() > best {
+                continue;
+            }
+            if node.count == 0 {
+                stack.extend([node.first, node.first + 1]);
+                continue;
+            }
+            for corners in &self.triangles[node.first as usize..(node.first + node.count) as usize]
+            {
+                let d = (closest_point(point, corners) - point).length_squared();
+                if d <= best && accept(corners) {
+                    best = d;
+                    found = true;
+                }
+            }
+        }
+        found.then(|| best.sqrt())
+    }
+}
+
+/// Levels of the tree. Children always follow their parent's chain, so a cycle
+/// cannot occur in a tree that obvhs built.
+fn depth(nodes: &[Node]) -> usize {
+    let mut deepest = 0;
+    let mut stack = if nodes.is_empty() {
+        vec![]
+    } else {
+        vec![(0u32, 1usize)]
+    };
+    while let Some((index, level)) = stack.pop() {
+        deepest = deepest.max(level);
+        let node = &nodes[index as usize];
+        if node.count == 0 {
+            stack.extend([(node.first, level + 1), (node.first + 1, level + 1)]);
+        }
+    }
+    deepest
+}
+
+/// The point of a triangle that is nearest to `p` (Ericson, Real-Time Collision
+/// Detection, section 5.1.5).
+pub fn closest_point(p: Vec3, &[a, b, c]: &[Vec3; 3]) -> Vec3 {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let (d1, d2) = (ab.dot(ap), ac.dot(ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return a;
+    }
+    let bp = p - b;
+    let (d3, d4) = (ab.dot(bp), ac.dot(bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return b;
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return a + ab * (d1 / (d1 - d3));
+    }
+    let cp = p - c;
+    let (d5, d6) = (ab.dot(cp), ac.dot(cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return c;
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return a + ac * (d2 / (d2 - d6));
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+        return b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
+    }
+    let sum = va + vb + vc;
+    a + ab * (vb / sum) + ac * (vc / sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::sampler::Sampler;
+
+    /// Triangles of many sizes and directions, the same every time.
+    fn soup(n: u32) -> Vec<[Vec3; 3]> {
+        let point = |i: u32, salt: u32| {
+            let [a, b] = Sampler::new(7, i, salt).pair(0, 0);
+            let [c, _] = Sampler::new(8, i, salt).pair(0, 0);
+            Vec3::new(a, b, c) * 2.0 - 1.0
+        };
+        (0..n)
+            .map(|i| {
+                let centre = point(i, 0);
+                let size = if i % 10 == 0 { 0.8 } else { 0.1 };
+                [1, 2, 3].map(|k| centre + point(i, k) * size)
+            })
+            .collect()
+    }
+
+    fn rays(n: u32, tmax: f32) -> impl Iterator<Item = Ray> {
+        (0..n).map(move |i| {
+            let [a, b] = Sampler::new(1, i, 1).pair(0, 0);
+            let [c, d] = Sampler::new(2, i, 1).pair(0, 0);
+            let z = 1.0 - 2.0 * d;
+            let (s, phi) = ((1.0 - z * z).sqrt(), 6.283_185_5 * c);
+            let direction = Vec3::new(s * phi.cos(), s * phi.sin(), z).normalize();
+            Ray::new(Vec3::new(a, b, c) * 2.4 - 1.2, direction, tmax)
+        })
+    }
+
+    #[test]
+    fn the_tree_agrees_with_brute_force() {
+        let triangles = soup(400);
+        let tracer = Tracer::new(&triangles).unwrap();
+        let mut hits = 0;
+        for ray in rays(20_000, 1.5) {
+            let brute = triangles
+                .iter()
+                .enumerate()
+                .filter_map(|(i, t)| ray.meets(t, ray.tmax).map(|(t, _)| (t, i as u32)))
+                .min_by(|a, b| a.0.total_cmp(&b.0));
+            assert_eq!(tracer.occluded(&ray), brute.is_some());
+            assert_eq!(tracer.closest(&ray).map(|h| h.t), brute.map(|b| b.0));
+            hits += usize::from(brute.is_some());
+        }
+        assert!(hits > 5_000, "the test must meet something: {hits}");
+    }
+
+    #[test]
+    fn no_ray_slips_through_the_edges_and_corners_of_a_closed_box() {
+        let mut mesh = aogauge_scenes::Mesh::default();
+        mesh.push_box(Vec3::new(-1.0, -0.7, -1.3), Vec3::new(0.9, 1.1, 1.0));
+        let triangles: Vec<_> = mesh.corners().collect();
+        let tracer = Tracer::new(&triangles).unwrap();
+        for (i, ray) in rays(20_000, 1.0).enumerate() {
+            let inside = ray
+                .origin
+                .clamp(Vec3::new(-0.9, -0.6, -1.2), Vec3::new(0.8, 1.0, 0.9));
+            let [a, b, _] = triangles[i % triangles.len()];
+            let s = (i % 101) as f32 / 100.0;
+            let target = a + (b - a) * s;
+            let ray = Ray::new(inside, (target - inside).normalize(), 10.0);
+            assert!(tracer.occluded(&ray), "{inside} to {target}");
+        }
+    }
+
+    #[test]
+    fn nearest_agrees_with_brute_force() {
+        let triangles = soup(200);
+        let tracer = Tracer::new(&triangles).unwrap();
+        for ray in rays(500, 1.0) {
+            let brute = triangles
+                .iter()
+                .map(|t| (closest_point(ray.origin, t) - ray.origin).length())
+                .min_by(f32::total_cmp)
+                .unwrap();
+            let found = tracer.nearest(ray.origin, 5.0, |_| true).unwrap();
+            assert!((found - brute).abs() < 1e-6);
+            assert_eq!(tracer.nearest(ray.origin, brute * 0.99, |_| true), None);
+        }
+    }
+}
