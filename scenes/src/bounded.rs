@@ -8,9 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize, de::Error};
 fn finite<'de, D: Deserializer<'de>>(d: D) -> Result<f32, D::Error> {
     let value = f64::deserialize(d)?;
     if !value.is_finite() || value.abs() > 1e12 {
-        return Err(D::Error::custom(format!(
-            "{value} is not allowed here: give a finite number of at most 1e12"
-        )));
+        return Err(D::Error::custom(format!("{value} is not allowed here: give a finite number of at most 1e12")));
     }
     Ok(value as f32)
 }

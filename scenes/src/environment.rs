@@ -59,23 +59,11 @@ struct PortalFile {
 impl EnvironmentFile {
     /// The environment; the message names a portal without area.
     pub(crate) fn build(&self) -> Result<Environment, String> {
-        let portals: Vec<Portal> = self
-            .portals
-            .iter()
-            .map(|p| Portal {
-                corner: p.corner.vec(),
-                u: p.u.vec(),
-                v: p.v.vec(),
-            })
-            .collect();
+        let portals: Vec<Portal> =
+            self.portals.iter().map(|p| Portal { corner: p.corner.vec(), u: p.u.vec(), v: p.v.vec() }).collect();
         if let Some(i) = portals.iter().position(|p| p.area() <= 0.0) {
-            return Err(format!(
-                "environment.portals[{i}] has no area: u and v must not be parallel"
-            ));
+            return Err(format!("environment.portals[{i}] has no area: u and v must not be parallel"));
         }
-        Ok(Environment {
-            radiance: self.radiance.0,
-            portals,
-        })
+        Ok(Environment { radiance: self.radiance.0, portals })
     }
 }

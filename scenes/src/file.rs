@@ -101,34 +101,19 @@ impl SceneFile {
             if objects.iter().any(|b: &Object| b.name == o.name) {
                 return Err(format!("two objects are called '{}'", o.name));
             }
-            let mesh = o
-                .shape
-                .mesh()
-                .map_err(|e| format!("object '{}': {e}", o.name))?;
-            mesh.validate()
-                .map_err(|e| format!("object '{}': {e}", o.name))?;
-            objects.push(Object {
-                name: o.name,
-                occluder: o.occluder,
-                albedo: o.albedo.map_or(0.6, |a| a.0),
-                mesh,
-            });
+            let mesh = o.shape.mesh().map_err(|e| format!("object '{}': {e}", o.name))?;
+            mesh.validate().map_err(|e| format!("object '{}': {e}", o.name))?;
+            objects.push(Object { name: o.name, occluder: o.occluder, albedo: o.albedo.map_or(0.6, |a| a.0), mesh });
         }
         if objects.iter().all(|o| o.occluder) {
-            return Err(
-                "the scene has no receiver: give at least one object that is not an occluder"
-                    .into(),
-            );
+            return Err("the scene has no receiver: give at least one object that is not an occluder".into());
         }
         let radius = self.ao.radius.0;
         Ok(Scene {
             name: name.to_owned(),
             description: self.description,
             control: self.control,
-            ao: AoScale {
-                radius,
-                secondary_radius: self.ao.secondary_radius.map_or(radius / 4.0, |r| r.0),
-            },
+            ao: AoScale { radius, secondary_radius: self.ao.secondary_radius.map_or(radius / 4.0, |r| r.0) },
             environment: self.environment.build()?,
             measure: self.measure.build(radius)?,
             look: self.look.build()?,
@@ -161,14 +146,9 @@ impl Scene {
     /// # Ok::<(), aogauge_scenes::SceneError>(())
     /// ```
     pub fn from_toml(name: &str, file: &str, text: &str) -> Result<Scene, SceneError> {
-        let parsed: SceneFile = toml::from_str(text).map_err(|e| SceneError::Toml {
-            file: file.to_owned(),
-            source: Box::new(e),
-        })?;
-        parsed.build(name).map_err(|message| SceneError::Invalid {
-            file: file.to_owned(),
-            message,
-        })
+        let parsed: SceneFile =
+            toml::from_str(text).map_err(|e| SceneError::Toml { file: file.to_owned(), source: Box::new(e) })?;
+        parsed.build(name).map_err(|message| SceneError::Invalid { file: file.to_owned(), message })
     }
 
     /// Reads a scene file; its name is the file's, without the ending.
@@ -178,13 +158,8 @@ impl Scene {
     /// [`Scene::from_toml`].
     pub fn from_file(path: &std::path::Path) -> Result<Scene, SceneError> {
         let file = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read {
-            file: file.clone(),
-            source,
-        })?;
-        let name = path
-            .file_stem()
-            .map_or_else(|| file.clone(), |s| s.to_string_lossy().into_owned());
+        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { file: file.clone(), source })?;
+        let name = path.file_stem().map_or_else(|| file.clone(), |s| s.to_string_lossy().into_owned());
         Scene::from_toml(&name, &file, &text)
     }
 

@@ -5,10 +5,7 @@ use crate::{Scene, SceneError};
 /// Name and TOML text of every built-in scene, in the order they are shown.
 pub const SCENES: [(&str, &str); 7] = [
     ("curtain-open", include_str!("../library/curtain-open.toml")),
-    (
-        "curtain-arcade",
-        include_str!("../library/curtain-arcade.toml"),
-    ),
+    ("curtain-arcade", include_str!("../library/curtain-arcade.toml")),
     ("curtain-room", include_str!("../library/curtain-room.toml")),
     ("pillar", include_str!("../library/pillar.toml")),
     ("plane", include_str!("../library/plane.toml")),
@@ -24,10 +21,7 @@ pub fn scene(name: &str) -> Result<Scene, SceneError> {
     let (_, text) = SCENES
         .iter()
         .find(|(n, _)| *n == name)
-        .ok_or_else(|| SceneError::Unknown {
-            name: name.to_owned(),
-            known: SCENES.map(|(n, _)| n).join(", "),
-        })?;
+        .ok_or_else(|| SceneError::Unknown { name: name.to_owned(), known: SCENES.map(|(n, _)| n).join(", ") })?;
     Scene::from_toml(name, &format!("{name}.toml (built in)"), text)
 }
 

@@ -81,9 +81,7 @@ impl Mesh {
 
     /// The corner positions of every triangle, in order.
     pub fn corners(&self) -> impl Iterator<Item = [Vec3; 3]> + '_ {
-        self.triangles
-            .iter()
-            .map(|t| t.map(|i| self.positions[i as usize]))
+        self.triangles.iter().map(|t| t.map(|i| self.positions[i as usize]))
     }
 
     /// Checks that every coordinate is finite and every index in range.
@@ -91,25 +89,13 @@ impl Mesh {
     /// # Errors
     /// The first vertex or triangle that is wrong.
     pub fn validate(&self) -> Result<(), MeshError> {
-        if let Some((vertex, p)) = self
-            .positions
-            .iter()
-            .enumerate()
-            .find(|(_, p)| !p.is_finite())
-        {
-            return Err(MeshError::NotFinite {
-                vertex,
-                position: p.to_array(),
-            });
+        if let Some((vertex, p)) = self.positions.iter().enumerate().find(|(_, p)| !p.is_finite()) {
+            return Err(MeshError::NotFinite { vertex, position: p.to_array() });
         }
         let vertices = self.positions.len();
         for (triangle, indices) in self.triangles.iter().enumerate() {
             if let Some(&index) = indices.iter().find(|&&i| i as usize >= vertices) {
-                return Err(MeshError::OutOfRange {
-                    triangle,
-                    index,
-                    vertices,
-                });
+                return Err(MeshError::OutOfRange { triangle, index, vertices });
             }
         }
         if self.triangles.is_empty() {
@@ -137,10 +123,7 @@ mod tests {
             }
         }
         assert_eq!(edges.len(), 18);
-        assert!(
-            edges.values().all(|&n| n == 0),
-            "every edge is walked once each way"
-        );
+        assert!(edges.values().all(|&n| n == 0), "every edge is walked once each way");
         for [a, b, c] in mesh.corners() {
             let normal = (b - a).cross(c - a);
             assert!(normal.length() > 0.0);
@@ -150,24 +133,12 @@ mod tests {
 
     #[test]
     fn bad_meshes_are_named() {
-        let mut mesh = Mesh {
-            positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(0.0, f32::NAN, 0.0)],
-            triangles: vec![[0, 1, 2]],
-        };
-        assert!(
-            mesh.validate()
-                .unwrap_err()
-                .to_string()
-                .contains("vertex 2")
-        );
+        let mut mesh =
+            Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(0.0, f32::NAN, 0.0)], triangles: vec![[0, 1, 2]] };
+        assert!(mesh.validate().unwrap_err().to_string().contains("vertex 2"));
         mesh.positions[2] = Vec3::Y;
         assert_eq!(mesh.validate(), Ok(()));
         mesh.triangles.push([0, 1, 3]);
-        assert!(
-            mesh.validate()
-                .unwrap_err()
-                .to_string()
-                .contains("vertex 3")
-        );
+        assert!(mesh.validate().unwrap_err().to_string().contains("vertex 3"));
     }
 }

@@ -63,10 +63,7 @@ impl Scene {
 
     /// All triangles in object order, each with the index of its object.
     pub fn triangles(&self) -> impl Iterator<Item = (usize, [Vec3; 3])> + '_ {
-        self.objects
-            .iter()
-            .enumerate()
-            .flat_map(|(i, o)| o.mesh.corners().map(move |t| (i, t)))
+        self.objects.iter().enumerate().flat_map(|(i, o)| o.mesh.corners().map(move |t| (i, t)))
     }
 
     /// Content hash (SHA-256, hex) of everything that can change a measurement:
@@ -79,11 +76,7 @@ impl Scene {
                 sha.update(v.to_bits().to_le_bytes());
             }
         };
-        floats(&[
-            self.ao.radius,
-            self.ao.secondary_radius,
-            self.environment.radiance,
-        ]);
+        floats(&[self.ao.radius, self.ao.secondary_radius, self.environment.radiance]);
         for p in &self.environment.portals {
             for v in [p.corner, p.u, p.v] {
                 floats(&v.to_array());

@@ -71,9 +71,7 @@ impl MeasureView {
         let (dx, dy) = (self.transect * self.pixel, -up * self.pixel);
         View {
             resolution: self.resolution,
-            origin: self.center + self.normal * self.clearance
-                - dx * (w as f32 / 2.0)
-                - dy * (h as f32 / 2.0),
+            origin: self.center + self.normal * self.clearance - dx * (w as f32 / 2.0) - dy * (h as f32 / 2.0),
             origin_dx: dx,
             origin_dy: dy,
             direction: -self.normal,
@@ -208,18 +206,12 @@ impl LookFile {
         if fov >= 170.0 {
             return Err(format!("look.fov is {fov}: it must be below 170 degrees"));
         }
-        Ok(LookView {
-            eye,
-            target,
-            fov,
-            resolution: self.resolution.0,
-        })
+        Ok(LookView { eye, target, fov, resolution: self.resolution.0 })
     }
 }
 
 fn unit(v: Vec3, field: &str) -> Result<Vec3, String> {
-    v.try_normalize()
-        .ok_or_else(|| format!("{field} is the zero vector: it must have a direction"))
+    v.try_normalize().ok_or_else(|| format!("{field} is the zero vector: it must have a direction"))
 }
 
 #[cfg(test)]

@@ -26,10 +26,7 @@ pub fn tangents(n: Vec3) -> [Vec3; 2] {
     let sign = if n.z >= 0.0 { 1.0 } else { -1.0 };
     let a = -1.0 / (sign + n.z);
     let b = n.x * n.y * a;
-    [
-        Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
-        Vec3::new(b, sign + n.y * n.y * a, -n.y),
-    ]
+    [Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), Vec3::new(b, sign + n.y * n.y * a, -n.y)]
 }
 
 /// A shaded point with what its rays share.
@@ -46,21 +43,8 @@ pub struct Shading<'a> {
 
 impl<'a> Shading<'a> {
     /// A point on a surface with its unit normal.
-    pub fn new(
-        tracer: &'a Tracer,
-        point: Vec3,
-        normal: Vec3,
-        ao: AoScale,
-        estimator: Estimator,
-    ) -> Self {
-        Shading {
-            tracer,
-            origin: point + normal * tracer.offset(),
-            normal,
-            frame: tangents(normal),
-            ao,
-            estimator,
-        }
+    pub fn new(tracer: &'a Tracer, point: Vec3, normal: Vec3, ao: AoScale, estimator: Estimator) -> Self {
+        Shading { tracer, origin: point + normal * tracer.offset(), normal, frame: tangents(normal), ao, estimator }
     }
 
     /// Decides one primary ray: which of primary, first and second secondary ray
@@ -73,10 +57,7 @@ impl<'a> Shading<'a> {
         // The direction in the plane of the surface, and across it.
         let along = t * cos_phi + b * sin_phi;
         let w = along * sin_theta + self.normal * cos_theta;
-        if self
-            .tracer
-            .occluded(&Ray::new(self.origin, w, self.ao.radius))
-        {
+        if self.tracer.occluded(&Ray::new(self.origin, w, self.ao.radius)) {
             return [true, false, false];
         }
         let Estimator::Extended { receiver_plane } = self.estimator else {
@@ -96,11 +77,7 @@ impl<'a> Shading<'a> {
         };
         let first = Ray::new(middle - d1 * reach, d1, 2.0 * reach);
         let second = Ray::new(middle - d2 * reach, d2, reach + down);
-        [
-            false,
-            self.tracer.occluded(&first),
-            self.tracer.occluded(&second),
-        ]
+        [false, self.tracer.occluded(&first), self.tracer.occluded(&second)]
     }
 
     /// Openness in half rays: 2 for an open primary ray, less 1 for each closed
@@ -143,11 +120,7 @@ mod tests {
 
     fn plane(half: f32) -> Tracer {
         let mut mesh = aogauge_scenes::Mesh::default();
-        mesh.push_quad(
-            Vec3::new(-half, 0.0, -half),
-            Vec3::Z * 2.0 * half,
-            Vec3::X * 2.0 * half,
-        );
+        mesh.push_quad(Vec3::new(-half, 0.0, -half), Vec3::Z * 2.0 * half, Vec3::X * 2.0 * half);
         Tracer::new(&mesh.corners().collect::<Vec<_>>()).unwrap()
     }
 
@@ -156,13 +129,9 @@ mod tests {
     fn an_empty_plane_reads_what_the_closed_form_says() {
         let tracer = plane(3.0);
         for (ratio, expected) in [(0.25f32, 0.9), (0.125, 1.0 - 0.03125 / 1.0625)] {
-            let ao = AoScale {
-                radius: 0.25,
-                secondary_radius: 0.25 * ratio,
-            };
+            let ao = AoScale { radius: 0.25, secondary_radius: 0.25 * ratio };
             let read = |estimator| {
-                let shading =
-                    Shading::new(&tracer, Vec3::new(0.1, 0.0, 0.2), Vec3::Y, ao, estimator);
+                let shading = Shading::new(&tracer, Vec3::new(0.1, 0.0, 0.2), Vec3::Y, ao, estimator);
                 let (halves, _) = shading.open_halves(65_536, &Sampler::new(1, 2, 3));
                 f64::from(halves) / 131_072.0
             };

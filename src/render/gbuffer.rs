@@ -36,18 +36,13 @@ impl GBuffer {
             .into_par_iter()
             .map(|pixel| {
                 let (origin, direction) = view.ray(pixel % width, pixel / width);
-                tracer
-                    .closest(&Ray::new(origin, direction, FAR_AWAY))
-                    .map(|hit| Surface {
-                        point: hit.point,
-                        normal: hit.normal,
-                        triangle: hit.triangle,
-                    })
+                tracer.closest(&Ray::new(origin, direction, FAR_AWAY)).map(|hit| Surface {
+                    point: hit.point,
+                    normal: hit.normal,
+                    triangle: hit.triangle,
+                })
             })
             .collect();
-        GBuffer {
-            resolution: view.resolution,
-            surfaces,
-        }
+        GBuffer { resolution: view.resolution, surfaces }
     }
 }

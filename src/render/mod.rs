@@ -92,15 +92,9 @@ impl Geometry {
     /// # Errors
     /// See [`Tracer::new`].
     pub fn new(scene: &Scene) -> Result<Self, RenderError> {
-        let (albedo, triangles): (Vec<f32>, Vec<_>) = scene
-            .triangles()
-            .map(|(object, corners)| (scene.objects[object].albedo, corners))
-            .unzip();
-        Ok(Geometry {
-            tracer: Tracer::new(&triangles)?,
-            albedo,
-            environment: scene.environment.clone(),
-        })
+        let (albedo, triangles): (Vec<f32>, Vec<_>) =
+            scene.triangles().map(|(object, corners)| (scene.objects[object].albedo, corners)).unzip();
+        Ok(Geometry { tracer: Tracer::new(&triangles)?, albedo, environment: scene.environment.clone() })
     }
 }
 
@@ -135,9 +129,7 @@ pub enum RenderError {
     #[error("no GPU adapter was found: {0}")]
     NoAdapter(String),
     /// The scene is larger than the device takes in one binding.
-    #[error(
-        "the scene needs {needs} bytes for its {what}, but the adapter takes at most {limit} in one binding"
-    )]
+    #[error("the scene needs {needs} bytes for its {what}, but the adapter takes at most {limit} in one binding")]
     TooLarge {
         /// Nodes, triangles or pixels.
         what: &'static str,

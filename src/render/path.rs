@@ -23,13 +23,7 @@ const SURE_BOUNCES: u32 = 3;
 ///
 /// The surfaces need not be `geometry`'s own: the twin is traced from the points
 /// of the scene with its occluder, with the same random numbers.
-pub fn irradiance(
-    geometry: &Geometry,
-    gbuffer: &GBuffer,
-    paths: u32,
-    seed: u32,
-    replicate: u32,
-) -> Vec<f32> {
+pub fn irradiance(geometry: &Geometry, gbuffer: &GBuffer, paths: u32, seed: u32, replicate: u32) -> Vec<f32> {
     gbuffer
         .surfaces
         .par_iter()
@@ -38,9 +32,7 @@ pub fn irradiance(
         .map(|(pixel, surface)| {
             surface.map_or(f32::NAN, |s| {
                 let sampler = Sampler::new(seed, pixel as u32, replicate);
-                let sum: f64 = (0..paths)
-                    .map(|i| path(geometry, s.point, s.normal, &sampler, i))
-                    .sum();
+                let sum: f64 = (0..paths).map(|i| path(geometry, s.point, s.normal, &sampler, i)).sum();
                 (sum / f64::from(paths)) as f32
             })
         })
@@ -62,10 +54,7 @@ fn path(geometry: &Geometry, point: Vec3, normal: Vec3, sampler: &Sampler, index
         let [t, b] = tangents(normal);
         let cosine = (1.0 - u).sqrt();
         let direction = (t * cos_phi + b * sin_phi) * u.sqrt() + normal * cosine;
-        let Some(hit) = geometry
-            .tracer
-            .closest(&Ray::new(origin, direction, FAR_AWAY))
-        else {
+        let Some(hit) = geometry.tracer.closest(&Ray::new(origin, direction, FAR_AWAY)) else {
             let density = cosine / std::f32::consts::PI;
             let weight = density / (density + portal_density(geometry, origin, direction));
             return sum + throughput * sky * f64::from(weight);
@@ -108,11 +97,7 @@ fn aimed(geometry: &Geometry, origin: Vec3, normal: Vec3, [u, v]: [f32; 2]) -> f
     }
     let aimed = portal_density(geometry, origin, direction);
     let bounced = cosine / std::f32::consts::PI;
-    if aimed <= 0.0
-        || geometry
-            .tracer
-            .occluded(&Ray::new(origin, direction, FAR_AWAY))
-    {
+    if aimed <= 0.0 || geometry.tracer.occluded(&Ray::new(origin, direction, FAR_AWAY)) {
         return 0.0;
     }
     f64::from(bounced / (aimed + bounced))
@@ -162,9 +147,7 @@ look = {{ eye = [1, 1, 1], target = [0, 0, 0], resolution = [16, 16] }}
     }
 
     fn mean(geometry: &Geometry, point: Vec3, normal: Vec3, n: u32) -> (f64, f64) {
-        let values: Vec<f64> = (0..n)
-            .map(|i| path(geometry, point, normal, &Sampler::new(9, i, 0), 0))
-            .collect();
+        let values: Vec<f64> = (0..n).map(|i| path(geometry, point, normal, &Sampler::new(9, i, 0), 0)).collect();
         let mean = values.iter().sum::<f64>() / f64::from(n);
         let var = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / f64::from(n - 1);
         (mean, (var / f64::from(n)).sqrt())
@@ -193,10 +176,7 @@ look = {{ eye = [1, 1, 1], target = [0, 0, 0], resolution = [16, 16] }}
         );
         let (m, se) = mean(&g, Vec3::new(1.0, 0.0, 0.0), Vec3::Y, 60_000);
         let expected = 2.0 / (2.0 - 0.6);
-        assert!(
-            (m - expected).abs() < 5.0 * se && se < 0.01,
-            "{m} +- {se}, expected {expected}"
-        );
+        assert!((m - expected).abs() < 5.0 * se && se < 0.01, "{m} +- {se}, expected {expected}");
     }
 
     /// Portals change the noise, never the mean: the room's floor with and
@@ -216,10 +196,7 @@ look = {{ eye = [1, 1, 1], target = [0, 0, 0], resolution = [16, 16] }}
                 "{m} +- {se}, {plain} +- {plain_se}"
             );
             if portals == full {
-                assert!(
-                    se < 0.6 * plain_se,
-                    "aiming at the window must pay: {se} against {plain_se}"
-                );
+                assert!(se < 0.6 * plain_se, "aiming at the window must pay: {se} against {plain_se}");
             }
         }
     }

@@ -54,9 +54,7 @@ pub struct Sampler {
 impl Sampler {
     /// `seed` is the run's, `pixel` counts row by row from the top left.
     pub fn new(seed: u32, pixel: u32, replicate: u32) -> Self {
-        Sampler {
-            seed: combine(combine(seed, replicate), pixel),
-        }
+        Sampler { seed: combine(combine(seed, replicate), pixel) }
     }
 
     /// Two numbers in [0, 1) for sample `index`, as multiples of 2^-24. Each
@@ -64,13 +62,10 @@ impl Sampler {
     #[inline]
     pub fn pair(&self, index: u32, dimension: u32) -> [f32; 2] {
         let seed = combine(self.seed, dimension);
-        let shuffled = owen_scramble(index.reverse_bits(), seed).reverse_bits();
+        let shuffled = owen_scramble(index, seed);
         let [x, y] = sobol(shuffled);
-        [
-            owen_scramble(x, hash(seed ^ 0x68bc_21eb)),
-            owen_scramble(y, hash(seed ^ 0x02e5_be93)),
-        ]
-        .map(|v| (v >> 8) as f32 * 2.0f32.powi(-24))
+        [owen_scramble(x, hash(seed ^ 0x68bc_21eb)), owen_scramble(y, hash(seed ^ 0x02e5_be93))]
+            .map(|v| (v >> 8) as f32 * 2.0f32.powi(-24))
     }
 }
 
@@ -82,10 +77,7 @@ pub fn turn(v: f32) -> [f32; 2] {
     let quadrant = (quarters + 0.5).floor();
     let x = (quarters - quadrant) * std::f32::consts::FRAC_PI_2;
     let x2 = x * x;
-    let s = x
-        * (1.0
-            + x2 * (-1.0 / 6.0
-                + x2 * (1.0 / 120.0 + x2 * (-1.0 / 5040.0 + x2 * (1.0 / 362_880.0)))));
+    let s = x * (1.0 + x2 * (-1.0 / 6.0 + x2 * (1.0 / 120.0 + x2 * (-1.0 / 5040.0 + x2 * (1.0 / 362_880.0)))));
     let c = 1.0 + x2 * (-0.5 + x2 * (1.0 / 24.0 + x2 * (-1.0 / 720.0 + x2 * (1.0 / 40_320.0))));
     match quadrant as u32 & 3 {
         0 => [c, s],
@@ -108,9 +100,7 @@ mod tests {
             v.push(v[k - 1] ^ (v[k - 1] >> 1));
         }
         for index in (0..2000u32).chain([0xdead_beef, u32::MAX]) {
-            let y = (0..32)
-                .filter(|k| index >> k & 1 == 1)
-                .fold(0, |y, k| y ^ v[k as usize]);
+            let y = (0..32).filter(|k| index >> k & 1 == 1).fold(0, |y, k| y ^ v[k as usize]);
             assert_eq!(sobol(index), [index.reverse_bits(), y], "{index}");
         }
     }
@@ -126,10 +116,7 @@ mod tests {
                     let [x, y] = sampler.pair(i, 2);
                     let cell = ((x * (1u32 << split) as f32) as u32) << (k - split)
                         | (y * (1u32 << (k - split)) as f32) as u32;
-                    assert!(
-                        !std::mem::replace(&mut seen[cell as usize], true),
-                        "k {k}, split {split}"
-                    );
+                    assert!(!std::mem::replace(&mut seen[cell as usize], true), "k {k}, split {split}");
                 }
             }
         }
@@ -144,12 +131,7 @@ mod tests {
             |i| Sampler::new(1, i, 0).pair(0, 0),
             |i| Sampler::new(1, 0, i).pair(0, 0),
             |i| Sampler::new(1, 0, 0).pair(0, i),
-            |i| {
-                [
-                    Sampler::new(1, i, 0).pair(3, 0)[0],
-                    Sampler::new(1, i, 1).pair(3, 0)[0],
-                ]
-            },
+            |i| [Sampler::new(1, i, 0).pair(3, 0)[0], Sampler::new(1, i, 1).pair(3, 0)[0]],
         ];
         for (which, draw) in draws.iter().enumerate() {
             let n = 65_536u32;
@@ -159,10 +141,7 @@ mod tests {
                 cells[(x * 16.0) as usize * 16 + (y * 16.0) as usize] += 1;
             }
             let expected = f64::from(n) / 256.0;
-            let chi2: f64 = cells
-                .iter()
-                .map(|&c| (f64::from(c) - expected).powi(2) / expected)
-                .sum();
+            let chi2: f64 = cells.iter().map(|&c| (f64::from(c) - expected).powi(2) / expected).sum();
             let p = ChiSquared::new(255.0).unwrap().sf(chi2);
             assert!(p > 1e-4, "draw {which}: chi2 {chi2}, p {p}");
         }

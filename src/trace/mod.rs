@@ -78,11 +78,7 @@ fn enter(node: &Node, origin: Vec3A, inverse: Vec3A, tmax: f32) -> f32 {
     let hi = (Vec3A::new(raw[4], raw[5], raw[6]) - origin) * inverse;
     let near = lo.min(hi).max_element().max(0.0);
     let far = lo.max(hi).min_element().min(tmax);
-    if near <= far * 1.000_000_4 {
-        near
-    } else {
-        f32::INFINITY
-    }
+    if near <= far * 1.000_000_4 { near } else { f32::INFINITY }
 }
 
 impl Tracer {
@@ -91,24 +87,11 @@ impl Tracer {
     /// # Errors
     /// [`TraceError::TooDeep`] on meshes with very many triangles in one place.
     pub fn new(triangles: &[[Vec3; 3]]) -> Result<Self, TraceError> {
-        let input: Vec<Triangle> = triangles
-            .iter()
-            .map(|[a, b, c]| Triangle {
-                v0: (*a).into(),
-                v1: (*b).into(),
-                v2: (*c).into(),
-            })
-            .collect();
+        let input: Vec<Triangle> =
+            triangles.iter().map(|[a, b, c]| Triangle { v0: (*a).into(), v1: (*b).into(), v2: (*c).into() }).collect();
         // medium_build does not pre-split, so primitive_indices is a permutation.
-        let bvh = build_bvh2_from_tris(
-            &input,
-            BvhBuildParams::medium_build(),
-            &mut Duration::default(),
-        );
-        let magnitude = triangles
-            .iter()
-            .flatten()
-            .fold(0.0f32, |m, v| m.max(v.abs().max_element()));
+        let bvh = build_bvh2_from_tris(&input, BvhBuildParams::medium_build(), &mut Duration::default());
+        let magnitude = triangles.iter().flatten().fold(0.0f32, |m, v| m.max(v.abs().max_element()));
         let pad = magnitude * 2.0f32.powi(-22);
         let nodes: Vec<Node> = bvh
             .nodes
@@ -163,13 +146,13 @@ impl Tracer {
 
     /// Whether anything lies on the ray within `(0, tmax]`.
     pub fn occluded(&self, ray: &Ray) -> bool {
-        self.walk(ray, ray.tmax, |triangle, tmax| {
-            if ray.meets(&self.triangles[triangle], tmax).is_some() {
-                None
-            } else {
-                Some(tmax)
-            }
-        })
+        self.walk(
+            ray,
+            ray.tmax,
+            |triangle, tmax| {
+                if ray.meets(&self.triangles[triangle], tmax).is_some() { None } else { Some(tmax) }
+            },
+        )
     }
 
     /// The nearest triangle on the ray within `(0, tmax]`.
@@ -189,11 +172,7 @@ impl Tracer {
                 t,
                 triangle: self.source[triangle],
                 point: a * w.x + b * w.y + c * w.z,
-                normal: if normal.dot(ray.direction) > 0.0 {
-                    -normal
-                } else {
-                    normal
-                },
+                normal: if normal.dot(ray.direction) > 0.0 { -normal } else { normal },
             }
         })
     }
@@ -226,10 +205,7 @@ impl Tracer {
             } else {
                 let first = node.first as usize;
                 let (mut near, mut far) = (&self.nodes[first], &self.nodes[first + 1]);
-                let (mut t_near, mut t_far) = (
-                    enter(near, origin, inverse, tmax),
-                    enter(far, origin, inverse, tmax),
-                );
+                let (mut t_near, mut t_far) = (enter(near, origin, inverse, tmax), enter(far, origin, inverse, tmax));
                 let mut far_index = first + 1;
                 if t_far < t_near {
                     std::mem::swap(&mut near, &mut far);
@@ -255,19 +231,10 @@ impl Tracer {
 
     /// Distance from a point to the nearest triangle that `accept` takes (by its
     /// corners), or None where there is none within `radius`.
-    pub fn nearest(
-        &self,
-        point: Vec3,
-        radius: f32,
-        accept: impl Fn(&[Vec3; 3]) -> bool,
-    ) -> Option<f32> {
+    pub fn nearest(&self, point: Vec3, radius: f32, accept: impl Fn(&[Vec3; 3]) -> bool) -> Option<f32> {
         let mut best = radius * radius;
         let mut found = false;
-        let mut stack: Vec<u32> = if self.nodes.is_empty() {
-            vec![]
-        } else {
-            vec![0]
-        };
+        let mut stack: Vec<u32> = if self.nodes.is_empty() { vec![] } else { vec![0] };
         while let Some(index) = stack.pop() {
             let node = &self.nodes[index as usize];
             let nearest = point.clamp(Vec3::from(node.min), Vec3::from(node.max));
@@ -278,8 +245,7 @@ impl Tracer {
                 stack.extend([node.first, node.first + 1]);
                 continue;
             }
-            for corners in &self.triangles[node.first as usize..(node.first + node.count) as usize]
-            {
+            for corners in &self.triangles[node.first as usize..(node.first + node.count) as usize] {
                 let d = (closest_point(point, corners) - point).length_squared();
                 if d <= best && accept(corners) {
                     best = d;
@@ -295,11 +261,7 @@ impl Tracer {
 /// cannot occur in a tree that obvhs built.
 fn depth(nodes: &[Node]) -> usize {
     let mut deepest = 0;
-    let mut stack = if nodes.is_empty() {
-        vec![]
-    } else {
-        vec![(0u32, 1usize)]
-    };
+    let mut stack = if nodes.is_empty() { vec![] } else { vec![(0u32, 1usize)] };
     while let Some((index, level)) = stack.pop() {
         deepest = deepest.max(level);
         let node = &nodes[index as usize];
@@ -401,9 +363,7 @@ mod tests {
         let triangles: Vec<_> = mesh.corners().collect();
         let tracer = Tracer::new(&triangles).unwrap();
         for (i, ray) in rays(20_000, 1.0).enumerate() {
-            let inside = ray
-                .origin
-                .clamp(Vec3::new(-0.9, -0.6, -1.2), Vec3::new(0.8, 1.0, 0.9));
+            let inside = ray.origin.clamp(Vec3::new(-0.9, -0.6, -1.2), Vec3::new(0.8, 1.0, 0.9));
             let [a, b, _] = triangles[i % triangles.len()];
             let s = (i % 101) as f32 / 100.0;
             let target = a + (b - a) * s;

@@ -28,11 +28,7 @@ pub struct Ray {
 /// 1/x, finite for every x: a ray in the plane of a box face then gives 0 * big
 /// = 0 in the slab test and not 0 * infinity = NaN.
 fn bounded_reciprocal(x: f32) -> f32 {
-    if x.abs() < 1e-30 {
-        1e30f32.copysign(x)
-    } else {
-        1.0 / x
-    }
+    if x.abs() < 1e-30 { 1e30f32.copysign(x) } else { 1.0 / x }
 }
 
 impl Ray {
@@ -100,27 +96,16 @@ mod tests {
         assert!((t - 2.0).abs() < 1e-6);
         assert!((w - Vec3::new(0.5, 0.2, 0.3)).length() < 1e-6);
         assert!(ray.meets(&tri, 1.99).is_none());
-        assert!(
-            Ray::new(from, Vec3::Z, 10.0).meets(&tri, 10.0).is_none(),
-            "behind"
-        );
+        assert!(Ray::new(from, Vec3::Z, 10.0).meets(&tri, 10.0).is_none(), "behind");
         let back = Ray::new(Vec3::new(0.2, 0.3, -1.0), Vec3::Z, 10.0);
         assert!(back.meets(&tri, 10.0).is_some(), "both sides count");
     }
 
     #[test]
     fn a_ray_that_starts_in_the_plane_does_not_meet_it() {
-        let tri = [
-            Vec3::new(-5.0, 0.0, -5.0),
-            Vec3::new(5.0, 0.0, -5.0),
-            Vec3::new(0.0, 0.0, 7.0),
-        ];
+        let tri = [Vec3::new(-5.0, 0.0, -5.0), Vec3::new(5.0, 0.0, -5.0), Vec3::new(0.0, 0.0, 7.0)];
         for d in [Vec3::Y, Vec3::new(1.0, 0.3, 0.2).normalize(), Vec3::X] {
-            assert!(
-                Ray::new(Vec3::new(0.3, 0.0, 0.1), d, 9.0)
-                    .meets(&tri, 9.0)
-                    .is_none()
-            );
+            assert!(Ray::new(Vec3::new(0.3, 0.0, 0.1), d, 9.0).meets(&tri, 9.0).is_none());
         }
     }
 }

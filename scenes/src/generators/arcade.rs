@@ -31,68 +31,19 @@ impl Arcade {
         let p = Vec3::new;
         let mut mesh = Mesh::default();
         // The floor meets in x = 0, where the end walls change their height.
-        mesh.push_corners([
-            p(back, 0.0, z),
-            p(0.0, 0.0, z),
-            p(0.0, 0.0, -z),
-            p(back, 0.0, -z),
-        ]);
-        mesh.push_corners([
-            p(0.0, 0.0, z),
-            p(front, 0.0, z),
-            p(front, 0.0, -z),
-            p(0.0, 0.0, -z),
-        ]);
+        mesh.push_corners([p(back, 0.0, z), p(0.0, 0.0, z), p(0.0, 0.0, -z), p(back, 0.0, -z)]);
+        mesh.push_corners([p(0.0, 0.0, z), p(front, 0.0, z), p(front, 0.0, -z), p(0.0, 0.0, -z)]);
         // Back wall, ceiling, the facade above the opening, the opposite wall.
-        mesh.push_corners([
-            p(back, 0.0, z),
-            p(back, 0.0, -z),
-            p(back, ceiling, -z),
-            p(back, ceiling, z),
-        ]);
-        mesh.push_corners([
-            p(back, ceiling, -z),
-            p(0.0, ceiling, -z),
-            p(0.0, ceiling, z),
-            p(back, ceiling, z),
-        ]);
-        mesh.push_corners([
-            p(0.0, ceiling, z),
-            p(0.0, ceiling, -z),
-            p(0.0, top, -z),
-            p(0.0, top, z),
-        ]);
-        mesh.push_corners([
-            p(front, 0.0, -z),
-            p(front, 0.0, z),
-            p(front, top, z),
-            p(front, top, -z),
-        ]);
+        mesh.push_corners([p(back, 0.0, z), p(back, 0.0, -z), p(back, ceiling, -z), p(back, ceiling, z)]);
+        mesh.push_corners([p(back, ceiling, -z), p(0.0, ceiling, -z), p(0.0, ceiling, z), p(back, ceiling, z)]);
+        mesh.push_corners([p(0.0, ceiling, z), p(0.0, ceiling, -z), p(0.0, top, -z), p(0.0, top, z)]);
+        mesh.push_corners([p(front, 0.0, -z), p(front, 0.0, z), p(front, top, z), p(front, top, -z)]);
         // End walls of the walk and of the courtyard.
-        mesh.push_corners([
-            p(back, 0.0, -z),
-            p(0.0, 0.0, -z),
-            p(0.0, ceiling, -z),
-            p(back, ceiling, -z),
-        ]);
-        mesh.push_corners([
-            p(0.0, 0.0, z),
-            p(back, 0.0, z),
-            p(back, ceiling, z),
-            p(0.0, ceiling, z),
-        ]);
+        mesh.push_corners([p(back, 0.0, -z), p(0.0, 0.0, -z), p(0.0, ceiling, -z), p(back, ceiling, -z)]);
+        mesh.push_corners([p(0.0, 0.0, z), p(back, 0.0, z), p(back, ceiling, z), p(0.0, ceiling, z)]);
         for end in [-z, z] {
-            let corners = [
-                p(0.0, 0.0, end),
-                p(front, 0.0, end),
-                p(front, top, end),
-                p(0.0, top, end),
-            ];
-            mesh.push_corners(if end < 0.0 {
-                corners
-            } else {
-                [corners[1], corners[0], corners[3], corners[2]]
-            });
+            let corners = [p(0.0, 0.0, end), p(front, 0.0, end), p(front, top, end), p(0.0, top, end)];
+            mesh.push_corners(if end < 0.0 { corners } else { [corners[1], corners[0], corners[3], corners[2]] });
         }
         mesh
     }

@@ -42,10 +42,7 @@ impl Curtain {
         let (w, l) = (self.thickness.0 / 2.0, self.length.0 / 2.0);
         let (bottom, top) = (self.gap.0, self.gap.0 + self.height.0);
         let mut mesh = Mesh::default();
-        mesh.push_box(
-            Vec3::new(self.at.x - w, bottom, self.at.z - l),
-            Vec3::new(self.at.x + w, top, self.at.z + l),
-        );
+        mesh.push_box(Vec3::new(self.at.x - w, bottom, self.at.z - l), Vec3::new(self.at.x + w, top, self.at.z + l));
         mesh
     }
 }

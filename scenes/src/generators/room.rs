@@ -35,10 +35,7 @@ pub struct Window {
 impl Room {
     pub(crate) fn mesh(&self) -> Result<Mesh, String> {
         let (x, y, z) = (self.width.0 / 2.0, self.height.0, self.depth.0 / 2.0);
-        let (low, high) = (
-            self.window.sill.0,
-            self.window.sill.0 + self.window.height.0,
-        );
+        let (low, high) = (self.window.sill.0, self.window.sill.0 + self.window.height.0);
         let side = self.window.width.0 / 2.0;
         if high >= y || side >= z {
             return Err(format!(
@@ -57,12 +54,7 @@ impl Room {
         // The wall with the window: four trapezia from the wall's corners to the
         // window's, so that every edge is shared and nothing leaks.
         let wall = [p(x, 0.0, -z), p(x, 0.0, z), p(x, y, z), p(x, y, -z)];
-        let hole = [
-            p(x, low, -side),
-            p(x, low, side),
-            p(x, high, side),
-            p(x, high, -side),
-        ];
+        let hole = [p(x, low, -side), p(x, low, side), p(x, high, side), p(x, high, -side)];
         for k in 0..4 {
             let n = (k + 1) % 4;
             mesh.push_corners([wall[k], wall[n], hole[n], hole[k]]);
@@ -81,11 +73,7 @@ mod tests {
             width: Positive(6.0),
             height: Positive(3.0),
             depth: Positive(4.0),
-            window: Window {
-                sill: Positive(1.0),
-                height: Positive(1.0),
-                width: Positive(1.5),
-            },
+            window: Window { sill: Positive(1.0), height: Positive(1.0), width: Positive(1.5) },
         };
         let mesh = room.mesh().unwrap();
         let centre = Vec3::new(0.0, 1.5, 0.0);
@@ -105,11 +93,7 @@ mod tests {
             width: Positive(6.0),
             height: Positive(1.9),
             depth: Positive(4.0),
-            window: Window {
-                sill: Positive(1.0),
-                height: Positive(1.0),
-                width: Positive(1.5),
-            },
+            window: Window { sill: Positive(1.0), height: Positive(1.0), width: Positive(1.5) },
         };
         assert!(room.mesh().unwrap_err().contains("window"));
     }

@@ -1,9 +1,6 @@
 //! The CPU reference renderer.
 
-use super::{
-    Frame, Geometry, Job, Loaded, RenderError, Renderer, ao::Shading, gbuffer::GBuffer,
-    sampler::Sampler,
-};
+use super::{Frame, Geometry, Job, Loaded, RenderError, Renderer, ao::Shading, gbuffer::GBuffer, sampler::Sampler};
 use aogauge_scenes::View;
 use rayon::prelude::*;
 use std::time::Instant;
@@ -25,10 +22,7 @@ impl Renderer for Cpu {
     }
 
     fn load<'a>(&'a self, geometry: &'a Geometry) -> Result<Box<dyn Loaded + 'a>, RenderError> {
-        Ok(Box::new(LoadedCpu {
-            geometry,
-            seen: None,
-        }))
+        Ok(Box::new(LoadedCpu { geometry, seen: None }))
     }
 }
 
@@ -37,12 +31,7 @@ impl Loaded for LoadedCpu<'_> {
         let tracer = &self.geometry.tracer;
         let gbuffer = match &self.seen {
             Some((view, gbuffer)) if view == job.view => gbuffer,
-            _ => {
-                &self
-                    .seen
-                    .insert((*job.view, GBuffer::new(tracer, job.view)))
-                    .1
-            }
+            _ => &self.seen.insert((*job.view, GBuffer::new(tracer, job.view))).1,
         };
         let start = Instant::now();
         let scale = 1.0 / (2.0 * job.rays as f32);
@@ -65,11 +54,7 @@ impl Loaded for LoadedCpu<'_> {
             resolution: gbuffer.resolution,
             values,
             decisions: Some(decisions),
-            seen: gbuffer
-                .surfaces
-                .iter()
-                .map(|s| s.map_or(u32::MAX, |s| s.triangle))
-                .collect(),
+            seen: gbuffer.surfaces.iter().map(|s| s.map_or(u32::MAX, |s| s.triangle)).collect(),
             seconds: start.elapsed().as_secs_f64(),
         })
     }
