@@ -1,7 +1,16 @@
 //! aogauge judges the image quality of ambient-occlusion renderers.
 
+pub mod cli;
+pub mod disk;
 pub mod flatland;
+pub mod gate;
+pub mod layers;
+pub mod metrics;
+pub mod record;
 pub mod render;
+pub mod report;
+pub mod run;
 pub mod stats;
+pub mod suite;
 pub mod trace;
 pub use aogauge_scenes as scenes;

@@ -1,0 +1,122 @@
+//! The command line: one file a verb, and what they share: exit codes.
+
+mod report;
+mod run;
+mod scene;
+mod schema;
+
+use crate::{disk::DiskError, report::ReportError, run::RunError, scenes::SceneError, suite::SuiteError};
+use clap::{Parser, Subcommand, ValueEnum};
+
+/// How a command ended, as the shell sees it. Where several hold, the first of
+/// 2, 4, 5, 3, 1, 6, 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exit {
+    /// All is well.
+    Pass = 0,
+    /// A gate failed.
+    Failed = 1,
+    /// Wrong usage or configuration.
+    Usage = 2,
+    /// A golden is missing or unreadable.
+    Golden = 3,
+    /// Nothing was selected.
+    Nothing = 4,
+    /// The run is incomplete.
+    Incomplete = 5,
+    /// The data do not decide.
+    Inconclusive = 6,
+}
+
+/// Judges the image quality of ambient-occlusion renderers.
+#[derive(Debug, Parser)]
+#[command(name = "aogauge", version, about, max_term_width = 100)]
+#[command(after_help = "Examples:\n  aogauge run\n  aogauge run --out reports/mine --seed 7\n\n\
+Exit codes: 0 pass, 1 gate failed, 2 usage or configuration, 3 golden missing or unreadable,\n\
+4 nothing selected, 5 run incomplete, 6 inconclusive.")]
+pub struct Cli {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    Run(run::Args),
+    Report(report::Args),
+    #[command(subcommand)]
+    Scene(scene::Verb),
+    Schema(schema::Args),
+}
+
+/// How results are printed on standard output.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// For people.
+    #[default]
+    Text,
+    /// For programs.
+    Json,
+}
+
+/// What went wrong, in one sentence, and the exit code it asks for.
+#[derive(Debug)]
+pub struct Failure {
+    /// For the shell.
+    pub exit: Exit,
+    /// For people.
+    pub message: String,
+}
+
+impl Failure {
+    fn usage(message: impl ToString) -> Self {
+        Failure { exit: Exit::Usage, message: message.to_string() }
+    }
+}
+
+macro_rules! usage {
+    ($($error:ty),*) => {$(
+        impl From<$error> for Failure {
+            fn from(e: $error) -> Self {
+                Failure::usage(e)
+            }
+        }
+    )*};
+}
+usage!(DiskError, ReportError, RunError, SceneError, SuiteError);
+
+impl Cli {
+    /// Does what was asked.
+    ///
+    /// # Errors
+    /// A [`Failure`] with its message and exit code.
+    pub fn execute(self) -> Result<Exit, Failure> {
+        match self.verb {
+            Verb::Run(args) => run::execute(&args),
+            Verb::Report(args) => report::execute(&args),
+            Verb::Scene(verb) => scene::execute(&verb),
+            Verb::Schema(args) => schema::execute(&args),
+        }
+    }
+}
+
+/// Prints a line for programs on standard output. A closed pipe is no error: the
+/// reader has what it wanted.
+fn print(text: &str) -> Result<(), Failure> {
+    use std::io::Write;
+    match std::io::stdout().write_all(text.as_bytes()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Failure::usage(format!("cannot write to standard output: {e}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Prints for people on standard error.
+#[allow(clippy::print_stderr)] // the one place that does
+fn tell(text: &str) {
+    eprintln!("{text}");
+}
+
+fn json(value: &impl serde::Serialize) -> Result<String, Failure> {
+    serde_json::to_string_pretty(value).map(|s| s + "\n").map_err(Failure::usage)
+}

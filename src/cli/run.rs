@@ -1,0 +1,131 @@
+//! `aogauge run`
+
+use super::{Exit, Failure, Format, json, print, tell};
+use crate::{
+    record::{Machine, Record, RecordFolder},
+    render::{Renderer, cpu::Cpu},
+    report,
+    run::{self, Observer},
+    suite::{Plan, Platform, Suite},
+};
+use clap::ValueEnum;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::path::PathBuf;
+
+/// Render a suite, measure, judge, and write a record and its report.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  aogauge run\n  aogauge run my-suite.toml --out reports/mine\n  \
+aogauge run --seed 7 --renderer cpu --format json")]
+pub struct Args {
+    /// A built-in suite by name, or a suite file.
+    #[arg(default_value = "thin-occluders")]
+    suite: String,
+    /// Folder for record.json, report.md and the images. An older record of that
+    /// name is moved aside to NAME.previous.
+    #[arg(long, default_value = "reports/latest")]
+    out: PathBuf,
+    /// Seed of all randomness; the suite's unless given.
+    #[arg(long)]
+    seed: Option<u32>,
+    /// Who renders.
+    #[arg(long, value_enum, default_value_t)]
+    renderer: Choice,
+    /// CPU threads; all unless given. Results do not depend on it.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// What is printed on standard output: nothing, or the record.
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Choice {
+    /// The CPU, and the GPU where there is one.
+    #[default]
+    Auto,
+    /// The CPU only.
+    Cpu,
+    /// The CPU, and the GPU on every case; an error where there is none.
+    Gpu,
+}
+
+/// Shows a bar on a terminal, and nothing elsewhere.
+struct Bar(ProgressBar);
+
+impl Observer for Bar {
+    fn step(&self, done: usize, total: usize, what: &str) {
+        self.0.set_length(total as u64);
+        self.0.set_position(done as u64);
+        self.0.set_message(what.to_owned());
+    }
+}
+
+fn bar() -> Bar {
+    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+    if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len}  {elapsed} (left {eta})  {wide_msg}") {
+        bar.set_style(style);
+    }
+    Bar(bar)
+}
+
+pub fn execute(args: &Args) -> Result<Exit, Failure> {
+    let suite = Suite::load(&args.suite)?;
+    let folder = RecordFolder::create(&args.out)?;
+    let mut pool = rayon::ThreadPoolBuilder::new();
+    if let Some(threads) = args.threads {
+        pool = pool.num_threads(threads.into());
+    }
+    let pool = pool.build().map_err(|e| Failure::usage(format!("cannot start {:?} threads: {e}", args.threads)))?;
+    let record = pool.install(|| render(args, &suite, &folder))?;
+    report::write(folder.path(), folder.path())?;
+    tell(&format!(
+        "{}\n{}\n{}: {}",
+        report::table::plain(&record),
+        record.summary_line(),
+        folder.path().join(report::FILE).display(),
+        if exit(&record) == Exit::Pass { "pass" } else { "not a pass" },
+    ));
+    if args.format == Format::Json {
+        print(&json(&record)?)?;
+    }
+    Ok(exit(&record))
+}
+
+fn render(args: &Args, suite: &Suite, folder: &RecordFolder) -> Result<Record, Failure> {
+    let gpu: Option<&dyn Renderer> = None;
+    let plan = Plan::new(suite, Platform::Cpu, args.seed);
+    let machine = Machine {
+        os: std::env::consts::OS.to_owned(),
+        arch: std::env::consts::ARCH.to_owned(),
+        cpu: cpu_name(),
+        gpu: String::new(),
+        gpu_is_software: None,
+    };
+    let bar = bar();
+    let record = run::run(&plan, &Cpu, gpu, machine, folder, &bar)?;
+    bar.0.finish_and_clear();
+    Ok(record)
+}
+
+fn cpu_name() -> String {
+    std::fs::read_to_string("/proc/cpuinfo")
+        .ok()
+        .and_then(|text| {
+            let line = text.lines().find(|l| l.starts_with("model name"))?;
+            Some(line.split_once(':')?.1.trim().to_owned())
+        })
+        .unwrap_or_else(|| "unnamed processor".to_owned())
+}
+
+fn exit(record: &Record) -> Exit {
+    let s = &record.summary;
+    if s.failed_cases > 0 {
+        Exit::Incomplete
+    } else if s.fail > 0 {
+        Exit::Failed
+    } else if s.inconclusive > 0 {
+        Exit::Inconclusive
+    } else {
+        Exit::Pass
+    }
+}

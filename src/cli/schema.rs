@@ -1,0 +1,35 @@
+//! `aogauge schema`
+
+use super::{Exit, Failure, json, print};
+use crate::{record::Record, scenes::Scene, suite::SuiteFile};
+use clap::ValueEnum;
+
+/// Print the JSON Schema of a format.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  aogauge schema record > record.schema.json")]
+pub struct Args {
+    /// Which format.
+    #[arg(value_enum, default_value_t)]
+    of: Of,
+}
+
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum Of {
+    /// record.json
+    #[default]
+    Record,
+    /// Suite files.
+    Suite,
+    /// Scene files.
+    Scene,
+}
+
+pub fn execute(args: &Args) -> Result<Exit, Failure> {
+    let schema = match args.of {
+        Of::Record => schemars::schema_for!(Record),
+        Of::Suite => schemars::schema_for!(SuiteFile),
+        Of::Scene => Scene::file_schema(),
+    };
+    print(&json(&schema)?)?;
+    Ok(Exit::Pass)
+}

@@ -1,0 +1,77 @@
+//! Files that are whole or not there at all: writes go to a temporary name in the
+//! same folder, then are renamed.
+
+use std::{
+    fs,
+    io::{self, BufWriter, Write},
+    path::{Path, PathBuf},
+};
+
+/// A file or folder that could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum DiskError {
+    /// The system refused.
+    #[error("{path}: cannot {action}: {source}")]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What was tried.
+        action: &'static str,
+        /// Why not.
+        source: io::Error,
+    },
+    /// The content is not what it should be.
+    #[error("{path}: {message}")]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        message: String,
+    },
+}
+
+impl DiskError {
+    /// Wraps an error of the system.
+    pub fn io(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> DiskError {
+        let path = path.to_owned();
+        move |source| DiskError::Io { path, action, source }
+    }
+
+    /// Says what is wrong with a file.
+    pub fn content(path: &Path, message: impl Into<String>) -> DiskError {
+        DiskError::Content { path: path.to_owned(), message: message.into() }
+    }
+}
+
+/// Creates the file's folder, writes the file under a temporary name, syncs it
+/// and renames it.
+///
+/// # Errors
+/// Where the folder cannot be made, or the file cannot be written or renamed.
+pub fn write_whole(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<&mut fs::File>) -> io::Result<()>,
+) -> Result<(), DiskError> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).map_err(DiskError::io(folder, "create the folder"))?;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".aogauge-").suffix(".part");
+    // The temporary file's own mode is private; a record is meant to be shared.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
+    let mut file = builder.tempfile_in(folder).map_err(DiskError::io(folder, "write into the folder"))?;
+    let mut buffer = BufWriter::new(file.as_file_mut());
+    write(&mut buffer).and_then(|()| buffer.flush()).map_err(DiskError::io(path, "write the file"))?;
+    drop(buffer);
+    file.as_file().sync_all().map_err(DiskError::io(path, "write the file"))?;
+    file.persist(path).map_err(|e| DiskError::io(path, "rename the finished file")(e.error))?;
+    Ok(())
+}
+
+/// Reads a text file.
+///
+/// # Errors
+/// Where it cannot be read or is not UTF-8.
+pub fn read_text(path: &Path) -> Result<String, DiskError> {
+    fs::read_to_string(path).map_err(DiskError::io(path, "read the file"))
+}

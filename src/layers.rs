@@ -1,0 +1,204 @@
+//! Images on disk: named layers of 32-bit floats in OpenEXR, and PNG for looking
+//! at.
+
+use crate::disk::{DiskError, write_whole};
+use exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, MetaData, ReadChannels, ReadLayers,
+    Text, Vec2, WritableImage, attribute::AttributeValue,
+};
+use sha2::{Digest, Sha256};
+use std::{collections::BTreeMap, fs, io, path::Path};
+
+/// Named layers of one resolution, with text attributes.
+///
+/// In the file, layer `name` is the channel `name.Y`, as OpenEXR viewers expect
+/// of grey layers; attributes carry the prefix `aogauge:`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Layers {
+    /// Width and height in pixels.
+    pub resolution: [u32; 2],
+    /// Values row by row from the top left.
+    pub layers: BTreeMap<String, Vec<f32>>,
+    /// Text by name.
+    pub attributes: BTreeMap<String, String>,
+}
+
+/// Prefix of our attributes in the file.
+const PREFIX: &str = "aogauge:";
+
+/// More bytes of pixels than this for a byte of file is no honest compression.
+const MAX_RATIO: u64 = 2000;
+
+impl Layers {
+    /// No layers yet.
+    pub fn new(resolution: [u32; 2]) -> Self {
+        Layers { resolution, ..Self::default() }
+    }
+
+    /// Adds a layer.
+    #[must_use]
+    pub fn with(mut self, name: &str, values: Vec<f32>) -> Self {
+        self.layers.insert(name.to_owned(), values);
+        self
+    }
+
+    /// A layer by name.
+    pub fn get(&self, name: &str) -> Option<&[f32]> {
+        self.layers.get(name).map(Vec::as_slice)
+    }
+
+    /// Writes an OpenEXR file, ZIP compressed, 32-bit floats. The bytes depend on
+    /// the content alone where there is at most one attribute.
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), DiskError> {
+        let size = Vec2(self.resolution[0] as usize, self.resolution[1] as usize);
+        let channels = self
+            .layers
+            .iter()
+            .map(|(name, values)| AnyChannel::new(format!("{name}.Y").as_str(), FlatSamples::F32(values.clone())))
+            .collect();
+        let mut attributes = LayerAttributes::default();
+        for (name, value) in &self.attributes {
+            let text = Text::new_or_none(value).unwrap_or_default();
+            attributes.other.insert(Text::from(format!("{PREFIX}{name}").as_str()), AttributeValue::Text(text));
+        }
+        let layer = Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, AnyChannels::sort(channels));
+        write_whole(path, |buffer| {
+            let mut bytes = io::Cursor::new(Vec::new());
+            Image::from_layer(layer).write().non_parallel().to_buffered(&mut bytes).map_err(io::Error::other)?;
+            io::Write::write_all(buffer, bytes.get_ref())
+        })
+    }
+
+    /// Reads a file that [`Layers::write`] wrote.
+    ///
+    /// # Errors
+    /// Where the file is missing, truncated, no OpenEXR, or claims more pixels
+    /// than its size can hold.
+    pub fn read(path: &Path) -> Result<Self, DiskError> {
+        let bytes = fs::read(path).map_err(DiskError::io(path, "read the image"))?;
+        if bytes.starts_with(b"version https://git-lfs") {
+            return Err(DiskError::content(path, "this is a Git LFS pointer, not the image: run `git lfs pull`"));
+        }
+        let broken = |e: exr::error::Error| DiskError::content(path, format!("not a readable OpenEXR image: {e}"));
+        let meta = MetaData::read_from_buffered(io::Cursor::new(&bytes), false).map_err(broken)?;
+        let claimed: u64 = meta
+            .headers
+            .iter()
+            .map(|h| h.layer_size.area() as u64 * h.channels.bytes_per_pixel as u64)
+            .fold(0, u64::saturating_add);
+        if claimed > (bytes.len() as u64).saturating_mul(MAX_RATIO) {
+            return Err(DiskError::content(
+                path,
+                format!(
+                    "the header claims {claimed} bytes of pixels, more than {} bytes of file can hold",
+                    bytes.len()
+                ),
+            ));
+        }
+        let image = exr::prelude::read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels()
+            .first_valid_layer()
+            .all_attributes()
+            .non_parallel()
+            .from_buffered(io::Cursor::new(&bytes))
+            .map_err(broken)?;
+        let layer = image.layer_data;
+        let mut layers = Layers::new([layer.size.0 as u32, layer.size.1 as u32]);
+        for channel in layer.channel_data.list {
+            let name = channel.name.to_string();
+            let name = name.strip_suffix(".Y").unwrap_or(&name).to_owned();
+            layers.layers.insert(name, channel.sample_data.values_as_f32().collect());
+        }
+        for (name, value) in layer.attributes.other {
+            if let (Some(name), AttributeValue::Text(text)) = (name.to_string().strip_prefix(PREFIX), value) {
+                layers.attributes.insert(name.to_owned(), text.to_string());
+            }
+        }
+        Ok(layers)
+    }
+}
+
+/// SHA-256 over the bits of every value: the same for the same picture, whatever
+/// the file looks like.
+pub fn pixel_hash(values: &[f32]) -> String {
+    let mut sha = Sha256::new();
+    for v in values {
+        sha.update(v.to_bits().to_le_bytes());
+    }
+    sha.finalize().iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// Writes an 8-bit RGB PNG.
+///
+/// # Errors
+/// Where the file cannot be written.
+pub fn write_png(path: &Path, picture: &image::RgbImage) -> Result<(), DiskError> {
+    write_whole(path, |buffer| {
+        let mut bytes = io::Cursor::new(Vec::new());
+        picture.write_to(&mut bytes, image::ImageFormat::Png).map_err(io::Error::other)?;
+        io::Write::write_all(buffer, bytes.get_ref())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample() -> Layers {
+        let mut layers = Layers::new([3, 2])
+            .with("mean", vec![0.0, 0.25, 1.0, f32::NAN, -2.5, 1e-30])
+            .with("variance", vec![0.5; 6]);
+        layers.attributes.insert("reason".into(), "first, with a \"quote\"".into());
+        layers
+    }
+
+    #[test]
+    fn what_is_written_is_read_to_the_last_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a/b.exr");
+        sample().write(&path).unwrap();
+        let back = Layers::read(&path).unwrap();
+        assert_eq!(back.resolution, [3, 2]);
+        assert_eq!(back.attributes, sample().attributes);
+        assert_eq!(pixel_hash(&back.layers["mean"]), pixel_hash(&sample().layers["mean"]));
+        assert_eq!(fs::read_dir(folder.path().join("a")).unwrap().count(), 1, "no temporary file stays");
+    }
+
+    #[test]
+    fn broken_files_are_errors() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        sample().write(&path).unwrap();
+        let whole = fs::read(&path).unwrap();
+        for end in [0, 3, 40, whole.len() / 2, whole.len() - 1] {
+            fs::write(&path, &whole[..end]).unwrap();
+            assert!(Layers::read(&path).is_err(), "cut at {end}");
+        }
+        fs::write(&path, "version https://git-lfs.github.com/spec/v1\n").unwrap();
+        assert!(Layers::read(&path).unwrap_err().to_string().contains("LFS"));
+        assert!(Layers::read(&folder.path().join("none.exr")).unwrap_err().to_string().contains("none.exr"));
+    }
+
+    /// Every byte of the header, one by one, set to its extremes: an error or an
+    /// image, never a panic.
+    #[test]
+    fn a_lying_header_does_not_panic() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        sample().write(&path).unwrap();
+        let whole = fs::read(&path).unwrap();
+        for i in 0..whole.len() {
+            for value in [0u8, 0x7f, 0xff] {
+                let mut bytes = whole.clone();
+                bytes[i] = value;
+                fs::write(&path, &bytes).unwrap();
+                let _ = Layers::read(&path);
+            }
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! The artifact: highlight contrast K, its error dK against the judge, and how
+//! much of it a method takes away.
+
+use super::{
+    Absent, Metric, MetricName,
+    judge::{Judge, contrast_of_means},
+    regions::{Region, Regions},
+};
+use crate::stats::{Estimate, Group, jackknife};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Which flank the footprint is compared with. The brighter one, not the mean of
+/// both: a profile that climbs from dark to bright has no apex.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Brighter {
+    /// The left flank.
+    Left,
+    /// The right flank.
+    Right,
+}
+
+impl Brighter {
+    /// Decides by the flanks' means of a converged image.
+    pub fn of(left: f64, right: f64) -> Self {
+        if left >= right { Brighter::Left } else { Brighter::Right }
+    }
+
+    /// The flank's region.
+    pub fn region(self) -> Region {
+        match self {
+            Brighter::Left => Region::Left,
+            Brighter::Right => Region::Right,
+        }
+    }
+}
+
+/// Weber contrast, footprint / flank - 1.
+pub fn contrast(footprint: f64, flank: f64) -> f64 {
+    footprint / flank - 1.0
+}
+
+/// One method's images in one scene: replicates, and its converged image.
+#[derive(Clone, Copy, Debug)]
+pub struct Method<'a> {
+    /// One openness image a replicate.
+    pub replicates: &'a [Vec<f32>],
+    /// The same estimator with many rays.
+    pub converged: &'a [f32],
+    /// Where to look.
+    pub regions: &'a Regions,
+}
+
+impl Method<'_> {
+    /// Which flank is brighter, decided once, on the converged image.
+    ///
+    /// # Errors
+    /// Where a flank is too small.
+    pub fn brighter(&self) -> Result<Brighter, Absent> {
+        let mean = |region| self.regions.mean(region, self.converged);
+        Ok(Brighter::of(mean(Region::Left)?, mean(Region::Right)?))
+    }
+
+    /// A row a replicate: mean of the footprint, mean of the brighter flank.
+    fn rows(&self) -> Result<Group, Absent> {
+        let flank = self.brighter()?.region();
+        self.replicates
+            .iter()
+            .map(|image| Ok(vec![self.regions.mean(Region::Footprint, image)?, self.regions.mean(flank, image)?]))
+            .collect()
+    }
+
+    /// K, and the same as Michelson contrast.
+    pub fn contrasts(&self) -> [Metric; 2] {
+        let of = |f: fn(&[f64]) -> f64| self.rows().map(|rows| jackknife(&[rows], |m| f(&m[0])));
+        [
+            Metric::new(MetricName::Contrast, None, of(|m| contrast(m[0], m[1]))),
+            Metric::new(MetricName::Michelson, None, of(|m| (m[0] - m[1]) / (m[0] + m[1]))),
+        ]
+    }
+
+    /// dK = K - K(Q), with its reading as the note where it is clearly not zero.
+    pub fn contrast_error(&self, judge: &Judge) -> Metric {
+        let estimate = self.rows().map(|rows| {
+            jackknife(&[rows, judge.means.clone()], |m| {
+                contrast(m[0][0], m[0][1]) - contrast_of_means(&m[1], judge.brighter)
+            })
+        });
+        let reading = estimate.as_ref().ok().and_then(|e| reading(e, judge.contrast().value?));
+        let mut metric = Metric::new(MetricName::ContrastError, None, estimate);
+        if metric.value.is_some() {
+            metric.note = reading.map(str::to_owned);
+        }
+        metric
+    }
+
+    /// 1 - max(0, dK) / dK(classic). The two methods share their seeds, so
+    /// replicates are paired.
+    pub fn removed(&self, classic: &Method<'_>, judge: &Judge) -> Metric {
+        Metric::new(MetricName::Removed, None, self.removed_estimate(classic, judge))
+    }
+
+    fn removed_estimate(&self, classic: &Method<'_>, judge: &Judge) -> Result<Estimate, Absent> {
+        let error = classic.contrast_error(judge);
+        let clear = error.estimate().is_some_and(|e| e.interval(0.95)[0] > 0.0);
+        if !clear {
+            return Err(Absent("classic shows no false highlight here, so there is nothing to remove".into()));
+        }
+        let paired: Group = self.rows()?.into_iter().zip(classic.rows()?).map(|(a, b)| [a, b].concat()).collect();
+        Ok(jackknife(&[paired, judge.means.clone()], |m| {
+            let kq = contrast_of_means(&m[1], judge.brighter);
+            let (method, classic) = (contrast(m[0][0], m[0][1]) - kq, contrast(m[0][2], m[0][3]) - kq);
+            1.0 - method.max(0.0) / classic
+        }))
+    }
+}
+
+/// How a contrast error reads, where its 95 % interval leaves out zero.
+fn reading(error: &Estimate, judge: f64) -> Option<&'static str> {
+    let [lo, hi] = error.interval(0.95);
+    match (lo > 0.0, hi < 0.0, judge > 0.0) {
+        (true, _, false) => Some("false highlight"),
+        (true, _, true) => Some("exaggerated highlight"),
+        (_, true, true) => Some("lost highlight"),
+        (_, true, false) => Some("over-correction"),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn readings_follow_the_signs() {
+        let e = |value| Estimate { value, se: 0.01, df: 15.0 };
+        assert_eq!(reading(&e(0.2), -0.1), Some("false highlight"));
+        assert_eq!(reading(&e(-0.2), 0.1), Some("lost highlight"));
+        assert_eq!(reading(&e(-0.2), -0.1), Some("over-correction"));
+        assert_eq!(reading(&e(0.005), -0.1), None);
+    }
+}

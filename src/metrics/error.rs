@@ -1,0 +1,91 @@
+//! How far an image is from another: from its own converged image, from the
+//! judge, from classic, from the CPU.
+
+use super::{
+    Absent, Metric, MetricName,
+    artifact::Method,
+    judge::Judge,
+    regions::{Region, Regions},
+};
+use crate::stats::Estimate;
+
+/// One value a replicate.
+fn over_replicates(
+    replicates: &[Vec<f32>],
+    mut f: impl FnMut(usize, &[f32]) -> Result<f64, Absent>,
+) -> Result<Estimate, Absent> {
+    let values: Result<Vec<f64>, Absent> = replicates.iter().enumerate().map(|(r, image)| f(r, image)).collect();
+    Ok(Estimate::of_mean(&values?))
+}
+
+/// Mean openness of every region that is large enough.
+pub fn openness(method: &Method<'_>) -> Vec<Metric> {
+    Region::ALL
+        .into_iter()
+        .map(|region| {
+            let estimate = over_replicates(method.replicates, |_, image| method.regions.mean(region, image));
+            Metric::new(MetricName::Openness, Some(region), estimate)
+        })
+        .collect()
+}
+
+/// Bias, MAE and RMSE of the replicates against the converged image.
+///
+/// MAE and RMSE are those of one replicate, so they hold its noise and fall with
+/// the ray count; bias does not.
+pub fn against_converged(method: &Method<'_>, region: Region) -> [Metric; 3] {
+    let pixels = method.regions.measurable(region);
+    let of = |f: fn(f64) -> f64, finish: fn(f64) -> f64| {
+        let pixels = pixels.clone()?;
+        over_replicates(method.replicates, |_, image| {
+            let sum: f64 =
+                pixels.iter().map(|&i| f(f64::from(image[i as usize]) - f64::from(method.converged[i as usize]))).sum();
+            Ok(finish(sum / pixels.len() as f64))
+        })
+    };
+    [
+        Metric::new(MetricName::Bias, Some(region), of(|d| d, |m| m)),
+        Metric::new(MetricName::Mae, Some(region), of(f64::abs, |m| m)),
+        Metric::new(MetricName::Rmse, Some(region), of(|d| d * d, f64::sqrt)),
+    ]
+}
+
+/// The physical error of a region: mean openness less the region's Q, and the
+/// root mean square of O - Q over the pixels whose Q is not masked.
+pub fn against_judge(method: &Method<'_>, judge: &Judge, region: Region) -> [Metric; 2] {
+    let bias = judge.q_of(region).ok_or_else(|| Absent("the judge has no such region".into())).and_then(|q| {
+        let o = over_replicates(method.replicates, |_, image| method.regions.mean(region, image))?;
+        let variance = o.se * o.se + q.se * q.se;
+        let welch = o.se.powi(4) / o.df + q.se.powi(4) / q.df;
+        let df = if welch > 0.0 { variance * variance / welch } else { 1.0 };
+        Ok(Estimate { value: o.value - q.value, se: variance.sqrt(), df })
+    });
+    let pixels: Vec<u32> =
+        method.regions.pixels(region).iter().copied().filter(|&i| !judge.masked(i as usize)).collect();
+    let rmse = if pixels.len() < super::regions::MIN_PIXELS {
+        Err(Absent(format!("only {} pixels of Q are not masked", pixels.len())))
+    } else {
+        over_replicates(method.replicates, |_, image| {
+            let sum: f64 = pixels.iter().map(|&i| f64::from(image[i as usize] - judge.q[i as usize]).powi(2)).sum();
+            Ok((sum / pixels.len() as f64).sqrt())
+        })
+    };
+    [Metric::new(MetricName::JudgeBias, Some(region), bias), Metric::new(MetricName::JudgeRmse, Some(region), rmse)]
+}
+
+/// Mean of O(classic) - O over the whole image, replicates paired by seed.
+pub fn over_darkening(method: &Method<'_>, classic: &Method<'_>) -> Metric {
+    Metric::new(MetricName::OverDarkening, None, difference(classic.replicates, method.replicates, method.regions))
+}
+
+/// Mean of O less the CPU's O over the whole image, replicates paired by seed.
+pub fn renderer_difference(own: &[Vec<f32>], cpu: &[Vec<f32>], regions: &Regions) -> Metric {
+    Metric::new(MetricName::RendererDifference, None, difference(own, cpu, regions))
+}
+
+fn difference(a: &[Vec<f32>], b: &[Vec<f32>], regions: &Regions) -> Result<Estimate, Absent> {
+    if a.len() != b.len() {
+        return Err(Absent("the two have different numbers of replicates".into()));
+    }
+    over_replicates(a, |r, image| Ok(regions.mean(Region::All, image)? - regions.mean(Region::All, &b[r])?))
+}

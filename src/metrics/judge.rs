@@ -1,0 +1,148 @@
+//! The judge: the occlusion ratio Q = E_with / E_without, from path-traced
+//! irradiance with the occluder in place and taken away, at the same points and
+//! with the same random numbers.
+
+use super::{
+    Absent, Metric, MetricName,
+    artifact::{Brighter, contrast},
+    regions::{Region, Regions},
+};
+use crate::stats::{Estimate, Group, jackknife, mean_variance};
+
+/// Pixels whose Q has a larger relative standard error are masked in images.
+pub const MASK_ABOVE: f64 = 0.05;
+
+/// Irradiance over pi of one replicate, a value a pixel; NaN where the view meets
+/// no surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pair {
+    /// With the occluder.
+    pub with: Vec<f32>,
+    /// Without it.
+    pub without: Vec<f32>,
+}
+
+/// Columns of a judge group: E_with and E_without of footprint, left and right.
+const COLUMNS: [Region; 3] = [Region::Footprint, Region::Left, Region::Right];
+
+/// Everything metrics need of the judge: region means a replicate, and images.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Judge {
+    /// A row a replicate: E_with, then E_without, of footprint, left, right.
+    pub means: Group,
+    /// Q a pixel; NaN where E_without is zero or there is no surface.
+    pub q: Vec<f32>,
+    /// Relative standard error of Q a pixel.
+    pub q_relative_se: Vec<f32>,
+    /// Irradiance over pi a pixel, with and without.
+    pub irradiance: [Vec<f32>; 2],
+    /// Which flank's Q is brighter.
+    pub brighter: Brighter,
+}
+
+/// Q of a region from the column means of a judge group.
+fn ratio(means: &[f64], region: usize) -> f64 {
+    means[region] / means[3 + region]
+}
+
+/// K(Q) from the column means of a judge group.
+pub fn contrast_of_means(means: &[f64], brighter: Brighter) -> f64 {
+    let flank = ratio(means, if brighter == Brighter::Left { 1 } else { 2 });
+    contrast(ratio(means, 0), flank)
+}
+
+impl Judge {
+    /// Works out the judge from its replicates.
+    ///
+    /// # Errors
+    /// Where a region is too small to measure.
+    pub fn new(replicates: &[Pair], regions: &Regions) -> Result<Self, Absent> {
+        let mut means = Vec::with_capacity(replicates.len());
+        for pair in replicates {
+            let mut row = Vec::with_capacity(6);
+            for image in [&pair.with, &pair.without] {
+                for region in COLUMNS {
+                    row.push(regions.mean(region, image)?);
+                }
+            }
+            means.push(row);
+        }
+        let pixels = replicates.first().map_or(0, |p| p.with.len());
+        let mut judge = Judge {
+            means,
+            q: Vec::with_capacity(pixels),
+            q_relative_se: Vec::with_capacity(pixels),
+            irradiance: [Vec::with_capacity(pixels), Vec::with_capacity(pixels)],
+            brighter: Brighter::Left,
+        };
+        for i in 0..pixels {
+            let (with, without): (Vec<f64>, Vec<f64>) =
+                replicates.iter().map(|p| (f64::from(p.with[i]), f64::from(p.without[i]))).unzip();
+            let (q, se) = ratio_of_means(&with, &without);
+            judge.q.push(q as f32);
+            judge.q_relative_se.push((se / q) as f32);
+            judge.irradiance[0].push(mean_variance(&with).0 as f32);
+            judge.irradiance[1].push(mean_variance(&without).0 as f32);
+        }
+        let [left, right] = [1, 2].map(|r| judge.region(r).value);
+        judge.brighter = Brighter::of(left, right);
+        Ok(judge)
+    }
+
+    fn region(&self, index: usize) -> Estimate {
+        jackknife(std::slice::from_ref(&self.means), |m| ratio(&m[0], index))
+    }
+
+    /// Q of a region: the ratio of its mean irradiances.
+    pub fn q_of(&self, region: Region) -> Option<Estimate> {
+        COLUMNS.iter().position(|&r| r == region).map(|i| self.region(i))
+    }
+
+    /// The widest 95 % interval among the regions' irradiances and ratios, as
+    /// half width over value.
+    pub fn widest(&self) -> f64 {
+        let half = |e: Estimate| {
+            let [lo, hi] = e.interval(0.95);
+            (hi - lo) / 2.0 / e.value
+        };
+        (0..6)
+            .map(|c| half(jackknife(std::slice::from_ref(&self.means), |m| m[0][c])))
+            .chain((0..3).map(|r| half(self.region(r))))
+            .fold(0.0, f64::max)
+    }
+
+    /// K(Q).
+    pub fn contrast(&self) -> Metric {
+        let k = jackknife(std::slice::from_ref(&self.means), |m| contrast_of_means(&m[0], self.brighter));
+        Metric::new(MetricName::JudgeContrast, None, Ok(k))
+    }
+
+    /// Whether a pixel of Q is too noisy to show.
+    pub fn masked(&self, pixel: usize) -> bool {
+        // NaN is masked too.
+        !(f64::from(self.q_relative_se[pixel]) <= MASK_ABOVE)
+    }
+}
+
+/// A ratio of means of paired values with its standard error by linearisation:
+/// the standard error of a - q b, over the mean of b.
+fn ratio_of_means(a: &[f64], b: &[f64]) -> (f64, f64) {
+    let (ma, mb) = (mean_variance(a).0, mean_variance(b).0);
+    let q = ma / mb;
+    let residuals: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - q * b).collect();
+    let variance = mean_variance(&residuals).1;
+    (q, (variance / a.len() as f64).sqrt() / mb)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ratio_of_paired_values_has_no_error_where_they_move_together() {
+        let b = [0.5, 0.7, 0.6, 0.9];
+        let a = b.map(|v| v * 0.4);
+        let (q, se) = ratio_of_means(&a, &b);
+        assert!((q - 0.4).abs() < 1e-12 && se < 1e-12);
+    }
+}

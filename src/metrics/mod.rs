@@ -1,0 +1,125 @@
+//! Numbers from images: where ([`regions`]), how bright against its surroundings
+//! ([`artifact`]), how wrong ([`error`]).
+
+pub mod artifact;
+pub mod error;
+pub mod judge;
+pub mod profile;
+pub mod regions;
+
+use crate::stats::Estimate;
+use regions::Region;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What is measured. Openness and what derives from it have no unit; all are
+/// means over replicates with their interval.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MetricName {
+    /// Mean openness of a region, 0 to 1.
+    Openness,
+    /// K = mean(footprint) / mean(brighter flank) - 1 (Weber), -1 and up.
+    /// Above 0 there is a highlight.
+    Contrast,
+    /// (footprint - flank) / (footprint + flank), -1 to 1 (Michelson).
+    Michelson,
+    /// K(Q), the contrast of the judge's occlusion ratio: what K should be.
+    JudgeContrast,
+    /// dK = K - K(Q), signed. 0 is right; above, the highlight is too strong.
+    ContrastError,
+    /// 1 - max(0, dK) / dK(classic): 0 leaves the artifact, 1 takes it away.
+    Removed,
+    /// Mean of O less the converged image of the same estimator. 0 is unbiased.
+    Bias,
+    /// Mean absolute difference from the converged image. Lower is better.
+    Mae,
+    /// Root mean square difference from the converged image. Lower is better.
+    Rmse,
+    /// Mean of O less the region's Q. Reported, never gated: it measures the
+    /// direction of light more than AO.
+    JudgeBias,
+    /// Root mean square of O less Q over the region's unmasked pixels. Reported,
+    /// never gated.
+    JudgeRmse,
+    /// Mean of O(classic) - O over the whole image. On a control, 0 is right.
+    OverDarkening,
+    /// Mean of O on this renderer less O on the CPU, same seeds.
+    RendererDifference,
+}
+
+impl MetricName {
+    /// As it is written in suites and records.
+    pub fn label(self) -> &'static str {
+        match self {
+            MetricName::Openness => "openness",
+            MetricName::Contrast => "contrast",
+            MetricName::Michelson => "michelson",
+            MetricName::JudgeContrast => "judge-contrast",
+            MetricName::ContrastError => "contrast-error",
+            MetricName::Removed => "removed",
+            MetricName::Bias => "bias",
+            MetricName::Mae => "mae",
+            MetricName::Rmse => "rmse",
+            MetricName::JudgeBias => "judge-bias",
+            MetricName::JudgeRmse => "judge-rmse",
+            MetricName::OverDarkening => "over-darkening",
+            MetricName::RendererDifference => "renderer-difference",
+        }
+    }
+}
+
+/// One number of one case, or why there is none.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Metric {
+    /// What.
+    pub name: MetricName,
+    /// Over which pixels; absent where the metric names its own regions.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub region: Option<Region>,
+    /// The value; null where it is not defined.
+    pub value: Option<f64>,
+    /// Standard error over replicates.
+    pub se: Option<f64>,
+    /// Degrees of freedom of the standard error.
+    pub df: Option<f64>,
+    /// Why the value is null, or how a contrast error reads.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub note: Option<String>,
+}
+
+impl Metric {
+    /// A measured metric.
+    pub fn new(name: MetricName, region: Option<Region>, estimate: Result<Estimate, Absent>) -> Self {
+        match estimate {
+            Ok(e) if e.value.is_finite() => {
+                let finite = |v: f64| v.is_finite().then_some(v);
+                Metric { name, region, value: Some(e.value), se: finite(e.se), df: finite(e.df), note: None }
+            }
+            Ok(_) => Self::absent(name, region, "a denominator is zero"),
+            Err(Absent(why)) => Self::absent(name, region, &why),
+        }
+    }
+
+    fn absent(name: MetricName, region: Option<Region>, why: &str) -> Self {
+        Metric { name, region, value: None, se: None, df: None, note: Some(why.to_owned()) }
+    }
+
+    /// Value and standard error, where both are known.
+    pub fn estimate(&self) -> Option<Estimate> {
+        Some(Estimate { value: self.value?, se: self.se?, df: self.df.unwrap_or(1.0) })
+    }
+
+    /// `name` or `name over region`, for people.
+    pub fn title(&self) -> String {
+        match self.region {
+            Some(region) => format!("{} over {}", self.name.label(), region.label()),
+            None => self.name.label().to_owned(),
+        }
+    }
+}
+
+/// Why a metric has no value.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Absent(pub String);

@@ -1,0 +1,337 @@
+//! The record: everything one run found, in a folder. It is the one thing that
+//! goldens and reports read.
+//!
+//! `record.json` is written last and is the commit mark: a folder without it is
+//! what a killed run left behind. Everything that differs between two runs of the
+//! same suite and seed stands under `timing`.
+
+use crate::{
+    disk::{DiskError, read_text, write_whole},
+    gate::{Outcome, Verdict},
+    metrics::{Metric, artifact::Brighter, profile::Curve, regions::Region},
+    suite::Case,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::{
+    collections::BTreeMap,
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+/// Version of the record's format. Readers refuse others.
+pub const VERSION: u32 = 1;
+
+/// The file that makes a folder a record.
+pub const FILE: &str = "record.json";
+
+/// Marks a folder that a run has begun to fill.
+const BEGUN: &str = ".aogauge-run";
+
+/// Everything one run found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Record {
+    /// Version of this format.
+    pub version: u32,
+    /// Version of the tool that wrote it.
+    pub tool: String,
+    /// The suite.
+    pub suite: SuiteInfo,
+    /// Seed of all randomness.
+    pub seed: u32,
+    /// The machine it ran on.
+    pub machine: Machine,
+    /// What the run came to.
+    pub summary: Summary,
+    /// Failures first, then in the order of gates and cases.
+    pub verdicts: Vec<Verdict>,
+    /// Gates that held for no case of this run, with the reason.
+    pub idle_gates: Vec<IdleGate>,
+    /// The scenes.
+    pub scenes: Vec<SceneRecord>,
+    /// The cases.
+    pub cases: Vec<CaseRecord>,
+    /// When, how long, on how many threads: all that differs between two runs.
+    pub timing: Timing,
+}
+
+/// The suite a record comes from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SuiteInfo {
+    /// Its name.
+    pub name: String,
+    /// What it is for.
+    pub description: String,
+    /// Replicates of each case.
+    pub replicates: u32,
+    /// Rays of the converged images.
+    pub converged_rays: u32,
+    /// Rays at which goldens are taken.
+    pub golden_rays: Option<u32>,
+    /// Estimator names, in order; the first of kind classic is `classic`.
+    pub estimators: Vec<String>,
+    /// The name of the classic estimator.
+    pub classic: String,
+}
+
+/// Where a run ran.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Machine {
+    /// Operating system.
+    pub os: String,
+    /// Instruction set.
+    pub arch: String,
+    /// Processor, where the system tells.
+    pub cpu: String,
+    /// GPU adapter and driver, or why there is none.
+    pub gpu: String,
+    /// Whether the adapter computes on the CPU; null where there is none.
+    pub gpu_is_software: Option<bool>,
+}
+
+/// Counts of verdicts and cases.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Summary {
+    /// Verdicts that passed.
+    pub pass: usize,
+    /// Verdicts that failed.
+    pub fail: usize,
+    /// Verdicts that the data do not decide.
+    pub inconclusive: usize,
+    /// Failures that are known and explained.
+    pub known_failures: usize,
+    /// Cases rendered.
+    pub cases: usize,
+    /// Cases that ended with an error.
+    pub failed_cases: usize,
+}
+
+impl Summary {
+    /// Counts.
+    pub fn new(verdicts: &[Verdict], cases: &[CaseRecord]) -> Self {
+        let count = |o: Outcome| verdicts.iter().filter(|v| v.outcome == o).count();
+        Summary {
+            pass: count(Outcome::Pass),
+            fail: count(Outcome::Fail),
+            inconclusive: count(Outcome::Inconclusive),
+            known_failures: count(Outcome::KnownFailure),
+            cases: cases.len(),
+            failed_cases: cases.iter().filter(|c| c.error.is_some()).count(),
+        }
+    }
+}
+
+/// A gate that nothing was held against.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct IdleGate {
+    /// The gate.
+    pub gate: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// What was found of a scene, whatever the estimator.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SceneRecord {
+    /// Its name.
+    pub name: String,
+    /// What it is for.
+    pub description: String,
+    /// Whether it is a control.
+    pub control: bool,
+    /// Content hash.
+    pub hash: String,
+    /// R, metres.
+    pub radius: f64,
+    /// R', metres.
+    pub secondary_radius: f64,
+    /// Triangles.
+    pub triangles: usize,
+    /// Width and height of the measure view, pixels.
+    pub resolution: [u32; 2],
+    /// Place of each column of the measure view along the transect, in R.
+    pub transect: Vec<f64>,
+    /// Pixels of each region.
+    pub regions: BTreeMap<Region, usize>,
+    /// Which flank of each method's converged image is brighter, `Q` among them.
+    pub brighter: BTreeMap<String, Brighter>,
+    /// The judge; null where there is no occluder to judge.
+    pub judge: Option<JudgeRecord>,
+    /// Openness along the transect on the CPU at the most rays, and Q.
+    pub profiles: Vec<Curve>,
+    /// Region masks and converged images, relative to the record.
+    pub image: String,
+    /// Pictures from the look view, relative to the record.
+    pub look: String,
+}
+
+/// What the judge found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JudgeRecord {
+    /// K(Q).
+    pub contrast: Metric,
+    /// Q of footprint, left and right, each with its 95 % interval.
+    pub q: BTreeMap<Region, [f64; 3]>,
+    /// Paths a pixel in one replicate.
+    pub paths: u32,
+    /// Replicates it took.
+    pub replicates: u32,
+    /// Half width of the widest 95 % interval of a region mean, relative.
+    pub precision: f64,
+    /// The precision asked for.
+    pub wanted: f64,
+    /// Irradiance and Q, relative to the record.
+    pub image: String,
+}
+
+/// What was found in a case.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CaseRecord {
+    /// The case.
+    pub case: Case,
+    /// Why it ended early; null where it did not.
+    pub error: Option<String>,
+    /// Mean, variance and replicates, relative to the record; null after an error.
+    pub image: Option<String>,
+    /// Hash of the mean image's pixels.
+    pub hash: Option<String>,
+    /// Its metrics.
+    pub metrics: Vec<Metric>,
+}
+
+impl CaseRecord {
+    /// A metric by name, and region where it has one.
+    pub fn metric(&self, name: crate::metrics::MetricName, region: Option<Region>) -> Option<&Metric> {
+        self.metrics.iter().find(|m| m.name == name && m.region == region)
+    }
+}
+
+/// When and how long.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Timing {
+    /// When the run began, UTC.
+    pub began: String,
+    /// Wall clock of the whole run, seconds.
+    pub seconds: f64,
+    /// CPU threads.
+    pub threads: usize,
+    /// Seconds of tracing in each case, all replicates, by case.
+    pub cases: BTreeMap<String, f64>,
+    /// Seconds the judge took, by scene.
+    pub judges: BTreeMap<String, f64>,
+}
+
+impl Record {
+    /// Reads a record folder.
+    ///
+    /// # Errors
+    /// Where `record.json` is missing (the run did not finish), malformed, or of
+    /// another version.
+    pub fn read(folder: &Path) -> Result<Self, DiskError> {
+        let path = folder.join(FILE);
+        if !path.exists() {
+            let why = if folder.join(BEGUN).exists() { "the run that wrote it did not finish" } else { "not a record" };
+            return Err(DiskError::content(folder, format!("there is no {FILE} here: {why}")));
+        }
+        let text = read_text(&path)?;
+        #[derive(Deserialize)]
+        struct Versioned {
+            version: u32,
+        }
+        let malformed = |e: serde_json::Error| DiskError::content(&path, format!("not a record: {e}"));
+        let versioned: Versioned = serde_json::from_str(&text).map_err(malformed)?;
+        if versioned.version != VERSION {
+            return Err(DiskError::content(
+                &path,
+                format!("record version {} is not supported, this tool reads version {VERSION}", versioned.version),
+            ));
+        }
+        serde_json::from_str(&text).map_err(malformed)
+    }
+
+    /// Text for people: `5 passed, 1 failed, ...`.
+    pub fn summary_line(&self) -> String {
+        let s = &self.summary;
+        let mut line = format!("{} passed, {} failed, {} inconclusive", s.pass, s.fail, s.inconclusive);
+        if s.known_failures > 0 {
+            line += &format!(", {} known failures", s.known_failures);
+        }
+        if s.failed_cases > 0 {
+            line += &format!("; {} of {} cases ended with an error", s.failed_cases, s.cases);
+        }
+        line
+    }
+}
+
+/// A folder that a run fills.
+#[derive(Debug)]
+pub struct RecordFolder {
+    path: PathBuf,
+}
+
+impl RecordFolder {
+    /// Makes an empty folder for a record. A folder of that name that holds a
+    /// record, or what a killed run left, is moved aside to `NAME.previous`
+    /// first; any other folder that is not empty is refused.
+    ///
+    /// # Errors
+    /// Where the folder cannot be written, or holds something else.
+    pub fn create(path: &Path) -> Result<Self, DiskError> {
+        let occupied = match fs::read_dir(path) {
+            Ok(mut entries) => entries.next().is_some(),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => false,
+            Err(e) => return Err(DiskError::io(path, "use this as the output folder")(e)),
+        };
+        if occupied {
+            if !path.join(FILE).exists() && !path.join(BEGUN).exists() {
+                return Err(DiskError::content(
+                    path,
+                    "the output folder holds files that are not a record: name another folder",
+                ));
+            }
+            let mut aside = path.as_os_str().to_owned();
+            aside.push(".previous");
+            let aside = PathBuf::from(aside);
+            if aside.exists() {
+                if !aside.join(FILE).exists() && !aside.join(BEGUN).exists() {
+                    return Err(DiskError::content(
+                        &aside,
+                        "the older record cannot be moved here: the folder holds something else",
+                    ));
+                }
+                fs::remove_dir_all(&aside).map_err(DiskError::io(&aside, "remove the record before last"))?;
+            }
+            fs::rename(path, &aside).map_err(DiskError::io(path, "move the older record aside"))?;
+        }
+        fs::create_dir_all(path).map_err(DiskError::io(path, "create the output folder"))?;
+        write_whole(&path.join(BEGUN), |_| Ok(()))?;
+        Ok(RecordFolder { path: path.to_owned() })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes `record.json`, which makes the folder a record.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn commit(&self, record: &Record) -> Result<(), DiskError> {
+        write_whole(&self.path.join(FILE), |buffer| {
+            serde_json::to_writer_pretty(&mut *buffer, record)?;
+            io::Write::write_all(buffer, b"\n")
+        })?;
+        let begun = self.path.join(BEGUN);
+        fs::remove_file(&begun).map_err(DiskError::io(&begun, "remove the mark of a running run"))
+    }
+}

@@ -1,0 +1,192 @@
+//! The Markdown report.
+
+use super::table::{self, Row, outcome_text, subject, value_text};
+use crate::{
+    gate::{CONFIDENCE, Outcome},
+    metrics::{Metric, MetricName, artifact::Brighter, regions::Region},
+    record::{CaseRecord, Record, SceneRecord},
+};
+use minijinja::{Environment, syntax::SyntaxConfig, value::Serde};
+use serde::Serialize;
+
+/// The folder of the report's pictures, beside it.
+pub const PICTURES: &str = "pictures";
+
+/// Everything the template shows.
+#[derive(Serialize)]
+struct Context<'a> {
+    record: &'a Record,
+    headline: &'a str,
+    rows: Vec<Row>,
+    verdicts: Vec<VerdictRow>,
+    scenes: Vec<SceneSection>,
+    judge_seconds: f64,
+    pictures: &'a str,
+    summary: String,
+}
+
+#[derive(Serialize)]
+struct VerdictRow {
+    outcome: &'static str,
+    gate: String,
+    subject: String,
+    metric: String,
+    value: String,
+    limit: String,
+}
+
+#[derive(Serialize)]
+struct SceneSection {
+    name: String,
+    description: String,
+    control: bool,
+    triangles: usize,
+    radius: f64,
+    secondary_radius: f64,
+    judge: Option<String>,
+    estimators: Vec<String>,
+    cases: Vec<CaseRow>,
+    regions: String,
+    errors: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct CaseRow {
+    estimator: String,
+    renderer: String,
+    rays: u32,
+    openness: String,
+    contrast: String,
+    contrast_error: String,
+    reading: String,
+    removed: String,
+    bias: String,
+    rmse: String,
+    over_darkening: String,
+    milliseconds: String,
+}
+
+fn show(metric: Option<&Metric>) -> String {
+    match metric {
+        None => "–".to_owned(),
+        Some(m) => match m.estimate() {
+            Some(e) if m.value.is_some() => value_text(m.value, Some(e.interval(CONFIDENCE))),
+            _ => format!("none: {}", m.note.as_deref().unwrap_or("no interval")),
+        },
+    }
+}
+
+fn case_row(record: &Record, case: &CaseRecord, has_judge: bool) -> CaseRow {
+    let get = |name, region| show(case.metric(name, region));
+    let error_region = if has_judge { Region::Footprint } else { Region::All };
+    let error = case.metric(MetricName::ContrastError, None);
+    let pixels = record.timing.cases.get(&case.case.id()).copied();
+    CaseRow {
+        estimator: case.case.estimator.clone(),
+        renderer: case.case.renderer.clone(),
+        rays: case.case.rays,
+        openness: get(MetricName::Openness, Some(Region::All)),
+        contrast: get(MetricName::Contrast, None),
+        contrast_error: show(error),
+        reading: error.and_then(|m| m.note.clone()).unwrap_or_default(),
+        removed: case
+            .metric(MetricName::Removed, None)
+            .filter(|m| m.value.is_some())
+            .map_or_else(|| "–".to_owned(), |m| show(Some(m))),
+        bias: get(MetricName::Bias, Some(error_region)),
+        rmse: get(MetricName::Rmse, Some(error_region)),
+        over_darkening: get(MetricName::OverDarkening, None),
+        milliseconds: pixels
+            .map_or_else(|| "–".to_owned(), |s| format!("{:.1}", s * 1e3 / f64::from(record.suite.replicates))),
+    }
+}
+
+fn judge_text(scene: &SceneRecord) -> Option<String> {
+    let judge = scene.judge.as_ref()?;
+    let reading = match judge.contrast.value {
+        Some(k) if k > 0.0 => "the highlight is real",
+        _ => "there is no highlight",
+    };
+    let flank = match scene.brighter.get("Q") {
+        Some(Brighter::Left) => "left",
+        _ => "right",
+    };
+    let q: Vec<String> = judge
+        .q
+        .iter()
+        .map(|(region, [value, lo, hi])| format!("{} {}", region.label(), value_text(Some(*value), Some([*lo, *hi]))))
+        .collect();
+    let reached = if judge.precision <= judge.wanted { "" } else { ", **less precise than asked**" };
+    Some(format!(
+        "K(Q) = {} against the {flank} flank: {reading}. Q: {}. {} replicates of {} paths a pixel, every region mean within {:.2} %{reached}.",
+        show(Some(&judge.contrast)),
+        q.join(", "),
+        judge.replicates,
+        judge.paths,
+        judge.precision * 100.0,
+    ))
+}
+
+fn section(record: &Record, scene: &SceneRecord) -> SceneSection {
+    let cases: Vec<&CaseRecord> = record.cases.iter().filter(|c| c.case.scene == scene.name).collect();
+    SceneSection {
+        name: scene.name.clone(),
+        description: scene.description.clone(),
+        control: scene.control,
+        triangles: scene.triangles,
+        radius: scene.radius,
+        secondary_radius: scene.secondary_radius,
+        judge: judge_text(scene),
+        estimators: record.suite.estimators.clone(),
+        cases: cases.iter().filter(|c| c.error.is_none()).map(|c| case_row(record, c, scene.judge.is_some())).collect(),
+        regions: scene.regions.iter().map(|(r, n)| format!("{} {n}", r.label())).collect::<Vec<_>>().join(", "),
+        errors: cases.iter().filter_map(|c| Some(format!("`{}`: {}", c.case.id(), c.error.as_ref()?))).collect(),
+    }
+}
+
+/// Cells of a table must not end it.
+fn cell(text: &str) -> String {
+    text.replace('|', "\\|").replace('\n', " ")
+}
+
+/// Writes the report's text.
+pub fn text(record: &Record) -> Result<String, minijinja::Error> {
+    let mut environment = Environment::new();
+    environment.set_syntax(SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build()?);
+    environment.add_filter("cell", |s: String| cell(&s));
+    environment.add_template("report", include_str!("report.md.j2"))?;
+    let verdicts: Vec<VerdictRow> = record
+        .verdicts
+        .iter()
+        .map(|v| VerdictRow {
+            outcome: outcome_text(v.outcome),
+            gate: v.gate.clone(),
+            subject: subject(v),
+            metric: v.metric.title(),
+            value: value_text(v.metric.value, v.interval),
+            limit: v.limit.text(),
+        })
+        .collect();
+    let rows: Vec<Row> = table::rows(record);
+    let headline = if record.summary.fail > 0 {
+        outcome_text(Outcome::Fail)
+    } else if record.summary.failed_cases > 0 {
+        "INCOMPLETE"
+    } else if record.summary.inconclusive > 0 {
+        outcome_text(Outcome::Inconclusive)
+    } else {
+        outcome_text(Outcome::Pass)
+    };
+    let scenes: Vec<SceneSection> = record.scenes.iter().map(|s| section(record, s)).collect();
+    let judge_seconds: f64 = record.timing.judges.values().sum();
+    environment.get_template("report")?.render(Serde(Context {
+        record,
+        headline,
+        rows,
+        verdicts,
+        scenes,
+        judge_seconds,
+        pictures: PICTURES,
+        summary: record.summary_line(),
+    }))
+}

@@ -1,0 +1,101 @@
+//! Reports: a record becomes Markdown with its pictures. Nothing here renders; a
+//! report can be made again from a record at any time.
+
+mod markdown;
+mod picture;
+mod plot;
+pub mod table;
+
+use crate::{
+    disk::{DiskError, write_whole},
+    layers::Layers,
+    record::{Record, SceneRecord},
+};
+use std::{io::Write, path::Path};
+
+/// The name of the report in its folder.
+pub const FILE: &str = "report.md";
+
+/// Why a report could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// The record or an image of it cannot be read, or the report not written.
+    #[error(transparent)]
+    Disk(#[from] DiskError),
+    /// An image lacks a layer that the record promises.
+    #[error("{image}: there is no layer '{layer}' in this image")]
+    Layer {
+        /// The image.
+        image: String,
+        /// The layer.
+        layer: String,
+    },
+    /// A plot could not be drawn.
+    #[error("the plot of scene '{scene}' cannot be drawn: {message}")]
+    Plot {
+        /// The scene.
+        scene: String,
+        /// Why.
+        message: String,
+    },
+    /// The built-in template failed.
+    #[error("the report template failed: {0}")]
+    Template(#[from] minijinja::Error),
+}
+
+/// Makes `report.md` and its pictures from the record in `record_folder`, into
+/// `out`. Returns the record.
+///
+/// # Errors
+/// Where the record or an image cannot be read, or the report not written.
+pub fn write(record_folder: &Path, out: &Path) -> Result<Record, ReportError> {
+    let record = Record::read(record_folder)?;
+    for scene in &record.scenes {
+        pictures(record_folder, &record, scene, &out.join(markdown::PICTURES).join(&scene.name))?;
+    }
+    let text = markdown::text(&record)?;
+    write_whole(&out.join(FILE), |buffer| buffer.write_all(text.as_bytes()))?;
+    Ok(record)
+}
+
+fn pictures(folder: &Path, record: &Record, scene: &SceneRecord, out: &Path) -> Result<(), ReportError> {
+    let read = |image: &str| Layers::read(&folder.join(image));
+    let layer = |layers: &Layers, image: &str, name: &str| {
+        layers
+            .get(name)
+            .map(<[f32]>::to_vec)
+            .ok_or_else(|| ReportError::Layer { image: image.to_owned(), layer: name.to_owned() })
+    };
+    let look = read(&scene.look)?;
+    for name in &record.suite.estimators {
+        picture::openness(
+            &layer(&look, &scene.look, name)?,
+            look.resolution,
+            1,
+            &out.join(format!("look-{name}.png")),
+        )?;
+    }
+    let traced = layer(&look, &scene.look, "path-traced")?;
+    picture::irradiance(&traced, look.resolution, &out.join("look-path-traced.png"))?;
+
+    let converged = read(&scene.image)?;
+    for name in &record.suite.estimators {
+        let values = layer(&converged, &scene.image, &format!("converged-{name}"))?;
+        picture::openness(&values, converged.resolution, 4, &out.join(format!("{name}.png")))?;
+    }
+    if let Some(judge) = &scene.judge {
+        let layers = read(&judge.image)?;
+        let mut q = layer(&layers, &judge.image, "q")?;
+        let se = layer(&layers, &judge.image, "q-relative-se")?;
+        for (q, se) in q.iter_mut().zip(se) {
+            // NaN is masked too.
+            if !(f64::from(se) <= crate::metrics::judge::MASK_ABOVE) {
+                *q = f32::NAN;
+            }
+        }
+        picture::openness(&q, layers.resolution, 4, &out.join("q.png"))?;
+    }
+    let svg = plot::profile(scene).map_err(|message| ReportError::Plot { scene: scene.name.clone(), message })?;
+    write_whole(&out.join("profile.svg"), |buffer| buffer.write_all(svg.as_bytes()))?;
+    Ok(())
+}

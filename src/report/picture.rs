@@ -1,0 +1,36 @@
+//! Pictures of float images.
+
+use crate::{disk::DiskError, layers::write_png};
+use image::{Rgb, RgbImage};
+use std::path::Path;
+
+/// Where there is no value: no surface, or a pixel of Q that is too noisy.
+const NOTHING: Rgb<u8> = Rgb([132, 160, 196]);
+
+/// Paints each value as a square of `scale` pixels.
+fn paint(values: &[f32], [width, height]: [u32; 2], scale: u32, grey: impl Fn(f32) -> u8) -> RgbImage {
+    RgbImage::from_fn(width * scale, height * scale, |x, y| {
+        let value = values[((y / scale) * width + x / scale) as usize];
+        if value.is_nan() { NOTHING } else { Rgb([grey(value); 3]) }
+    })
+}
+
+/// Openness as engines show it: the grey level is the value, 0 black and 1 white,
+/// without a transfer curve.
+pub fn openness(values: &[f32], resolution: [u32; 2], scale: u32, path: &Path) -> Result<(), DiskError> {
+    let grey = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
+    write_png(path, &paint(values, resolution, scale, grey))
+}
+
+/// Light: exposed so that the 98th percentile is white, then encoded as sRGB.
+pub fn irradiance(values: &[f32], resolution: [u32; 2], path: &Path) -> Result<(), DiskError> {
+    let mut sorted: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    sorted.sort_by(f32::total_cmp);
+    let white = sorted.get(sorted.len() * 98 / 100).copied().unwrap_or(1.0).max(f32::MIN_POSITIVE);
+    let grey = |v: f32| {
+        let v = (v / white).clamp(0.0, 1.0);
+        let encoded = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+        (encoded * 255.0).round() as u8
+    };
+    write_png(path, &paint(values, resolution, 1, grey))
+}

@@ -1,0 +1,126 @@
+//! Verdicts as rows, for the terminal and for Markdown: a row a gate, with the
+//! case that comes closest to its limit.
+
+use crate::{
+    gate::{Limit, Outcome, Verdict},
+    record::Record,
+};
+use serde::Serialize;
+
+/// A gate with what came of it on all its cases.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// `PASS`, `FAIL`, `INCONCLUSIVE` or `KNOWN FAILURE`: the worst of its cases.
+    pub outcome: &'static str,
+    /// The gate.
+    pub gate: String,
+    /// How many cases were held against it.
+    pub cases: usize,
+    /// The case nearest to the limit, or furthest beyond it.
+    pub nearest: String,
+    /// Its value with the interval.
+    pub value: String,
+    /// The limit.
+    pub limit: String,
+    /// Why, for what did not pass.
+    pub reason: Option<String>,
+}
+
+/// How people read an outcome.
+pub fn outcome_text(outcome: Outcome) -> &'static str {
+    match outcome {
+        Outcome::Pass => "PASS",
+        Outcome::Fail => "FAIL",
+        Outcome::Inconclusive => "INCONCLUSIVE",
+        Outcome::KnownFailure => "KNOWN FAILURE",
+    }
+}
+
+/// `value [lo, hi]` with the digits that the interval earns.
+pub fn value_text(value: Option<f64>, interval: Option<[f64; 2]>) -> String {
+    let Some(value) = value else {
+        return "none".to_owned();
+    };
+    let Some([lo, hi]) = interval else {
+        return format!("{value:.4}");
+    };
+    let half = (hi - lo) / 2.0;
+    let digits = if half > 0.0 { (1.0 - half.log10().floor()).clamp(2.0, 6.0) as usize } else { 4 };
+    format!("{value:+.digits$} [{lo:+.digits$}, {hi:+.digits$}]")
+}
+
+/// The case of a verdict, or `scene (judge)`.
+pub fn subject(verdict: &Verdict) -> String {
+    verdict.case.as_ref().map_or_else(|| format!("{} (judge)", verdict.scene), |c| c.id())
+}
+
+/// How far inside its limit a verdict's value lies; negative outside.
+fn margin(verdict: &Verdict) -> f64 {
+    let Some(value) = verdict.metric.value else {
+        return f64::NEG_INFINITY;
+    };
+    match verdict.limit {
+        Limit::AtLeast(limit) => value - limit,
+        Limit::AtMost(limit) => limit - value,
+        Limit::Equals { target, within } => within - (value - target).abs(),
+    }
+}
+
+/// A row a gate, worst outcome first.
+pub fn rows(record: &Record) -> Vec<Row> {
+    let mut gates: Vec<&str> = Vec::new();
+    for v in &record.verdicts {
+        if !gates.contains(&v.gate.as_str()) {
+            gates.push(&v.gate);
+        }
+    }
+    gates
+        .into_iter()
+        .filter_map(|gate| {
+            let of_gate = || record.verdicts.iter().filter(move |v| v.gate == gate);
+            let worst = of_gate().map(|v| v.outcome).min()?;
+            let nearest = of_gate().filter(|v| v.outcome == worst).min_by(|a, b| margin(a).total_cmp(&margin(b)))?;
+            Some(Row {
+                outcome: outcome_text(worst),
+                gate: gate.to_owned(),
+                cases: of_gate().count(),
+                nearest: subject(nearest),
+                value: value_text(nearest.metric.value, nearest.interval),
+                limit: nearest.limit.text(),
+                reason: (worst != Outcome::Pass).then(|| nearest.reason.clone()),
+            })
+        })
+        .collect()
+}
+
+/// The table as plain text, columns aligned.
+pub fn plain(record: &Record) -> String {
+    let rows = rows(record);
+    let width = |f: fn(&Row) -> &str| rows.iter().map(|r| f(r).chars().count()).max().unwrap_or(0);
+    let (a, b, c, d) = (width(|r| r.outcome), width(|r| &r.gate), width(|r| &r.nearest), width(|r| &r.value));
+    let mut text = String::new();
+    for r in &rows {
+        let Row { outcome, gate, nearest, value, limit, cases, .. } = r;
+        text += &format!("{outcome:<a$}  {gate:<b$}  {cases:>3}x  {nearest:<c$}  {value:<d$}  {limit}\n");
+        if let Some(reason) = &r.reason {
+            text += &format!("{:a$}  {reason}\n", "");
+        }
+    }
+    for idle in &record.idle_gates {
+        text += &format!("{:<a$}  {}: {}\n", "NOT RUN", idle.gate, idle.reason);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_show_the_digits_their_interval_earns() {
+        assert_eq!(value_text(Some(0.123_456), Some([0.12, 0.13])), "+0.1235 [+0.1200, +0.1300]");
+        assert_eq!(value_text(Some(1.0), Some([0.5, 1.5])), "+1.00 [+0.50, +1.50]");
+        assert_eq!(value_text(Some(1.0), Some([1.0, 1.0])), "+1.0000 [+1.0000, +1.0000]");
+        assert_eq!(value_text(None, None), "none");
+    }
+}

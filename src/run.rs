@@ -1,0 +1,530 @@
+//! A plan becomes a record: render, measure, judge, write.
+
+use crate::{
+    disk::DiskError,
+    gate::Verdict,
+    layers::{Layers, pixel_hash},
+    metrics::{
+        Metric,
+        artifact::Method as Measured,
+        error,
+        judge::{Judge, Pair},
+        profile,
+        regions::{Region, Regions},
+    },
+    record::{
+        CaseRecord, IdleGate, JudgeRecord, Machine, Record, RecordFolder, SceneRecord, SuiteInfo, Summary, Timing,
+        VERSION,
+    },
+    render::{Frame, Geometry, Job, Loaded, RenderError, Renderer, gbuffer::GBuffer, path},
+    scenes::{Scene, View},
+    stats::mean_variance,
+    suite::{Case, Plan, Suite},
+};
+use std::{collections::BTreeMap, time::Instant};
+
+/// Added to the seed for images that must not share random numbers with the
+/// replicates they are compared with.
+const CONVERGED: u32 = 0x00c0_0000;
+const JUDGE: u32 = 0x0010_0000;
+const LOOK: u32 = 0x0001_0000;
+
+/// Why a run ended without a record.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// A file could not be written.
+    #[error(transparent)]
+    Disk(#[from] DiskError),
+    /// The CPU reference could not render, so there is nothing to compare with.
+    #[error("scene '{scene}': {source}")]
+    Render {
+        /// The scene.
+        scene: String,
+        /// Why.
+        source: RenderError,
+    },
+    /// The measure view of a scene sees nothing.
+    #[error(
+        "scene '{scene}': the measure view sees no surface; check measure.center, measure.normal and measure.clearance"
+    )]
+    SeesNothing {
+        /// The scene.
+        scene: String,
+    },
+    /// There is a judge to be asked but nothing to ask about.
+    #[error("scene '{scene}': {why}; check the occluder, measure.transect and measure.resolution")]
+    NoRegions {
+        /// The scene.
+        scene: String,
+        /// Which region is missing.
+        why: String,
+    },
+}
+
+/// What a run tells about itself on the way.
+pub trait Observer {
+    /// `done` of `total` steps are done, and `what` comes next.
+    fn step(&self, done: usize, total: usize, what: &str);
+}
+
+/// How many steps a plan has: each case, each converged image, the judge and the
+/// pictures of each scene.
+pub fn steps(plan: &Plan<'_>) -> usize {
+    let per_scene = plan.suite.methods.len() + 2;
+    plan.cases.len() + plan.suite.scenes.len() * per_scene
+}
+
+/// Runs a plan and commits its record.
+///
+/// A case whose renderer fails ends with its error; the others go on. `gpu` is
+/// used for the plan's cases on `gpu`.
+///
+/// # Errors
+/// Where the folder cannot be written, or the CPU reference fails.
+pub fn run(
+    plan: &Plan<'_>,
+    cpu: &dyn Renderer,
+    gpu: Option<&dyn Renderer>,
+    machine: Machine,
+    folder: &RecordFolder,
+    observer: &dyn Observer,
+) -> Result<Record, RunError> {
+    let start = Instant::now();
+    let mut timing = Timing {
+        began: jiff::Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string(),
+        threads: rayon::current_num_threads(),
+        ..Timing::default()
+    };
+    let mut progress = Progress { observer, done: 0, total: steps(plan) };
+    let (mut scenes, mut cases) = (Vec::new(), Vec::new());
+    for scene in &plan.suite.scenes {
+        let set = Set::new(plan, scene, folder)?;
+        let (scene_record, case_records) = set.run(cpu, gpu, &mut progress, &mut timing)?;
+        scenes.push(scene_record);
+        cases.extend(case_records);
+    }
+    timing.seconds = start.elapsed().as_secs_f64();
+    let (verdicts, idle_gates) = verdicts(plan, &scenes, &cases);
+    let record = Record {
+        version: VERSION,
+        tool: env!("CARGO_PKG_VERSION").to_owned(),
+        suite: suite_info(plan.suite),
+        seed: plan.seed,
+        machine,
+        summary: Summary::new(&verdicts, &cases),
+        verdicts,
+        idle_gates,
+        scenes,
+        cases,
+        timing,
+    };
+    folder.commit(&record)?;
+    Ok(record)
+}
+
+fn suite_info(suite: &Suite) -> SuiteInfo {
+    SuiteInfo {
+        name: suite.name.clone(),
+        description: suite.file.description.clone(),
+        replicates: suite.file.replicates.get(),
+        converged_rays: suite.file.converged_rays.get(),
+        golden_rays: suite.file.golden_rays.map(|r| r.get()),
+        estimators: suite.methods.iter().map(|m| m.name.clone()).collect(),
+        classic: suite.methods[suite.classic()].name.clone(),
+    }
+}
+
+/// Holds every gate against every case it applies to. Failures come first.
+fn verdicts(plan: &Plan<'_>, scenes: &[SceneRecord], cases: &[CaseRecord]) -> (Vec<Verdict>, Vec<IdleGate>) {
+    let (mut verdicts, mut idle) = (Vec::new(), Vec::new());
+    for gate in &plan.suite.gates {
+        let before = verdicts.len();
+        for scene in scenes.iter().filter(|s| gate.applies_to_judge(&s.name)) {
+            let missing =
+                || Metric::new(gate.metric, None, Err(crate::metrics::Absent("the scene has no occluder".into())));
+            let metric = scene.judge.as_ref().map_or_else(missing, |j| j.contrast.clone());
+            verdicts.push(gate.verdict(&scene.name, None, &metric));
+        }
+        let mut failed = 0;
+        for record in cases.iter().filter(|c| gate.applies_to(&c.case)) {
+            match record.metric(gate.metric, gate.region) {
+                Some(metric) => verdicts.push(gate.verdict(&record.case.scene, Some(&record.case), metric)),
+                None => failed += usize::from(record.error.is_some()),
+            }
+        }
+        if verdicts.len() == before {
+            let reason = if failed > 0 {
+                "every case it holds for ended with an error"
+            } else if gate.renderers.iter().any(|r| r == "gpu") && !plan.cases.iter().any(|c| c.renderer == "gpu") {
+                "this run had no GPU adapter"
+            } else {
+                "no case of this run has this metric"
+            };
+            idle.push(IdleGate { gate: gate.name.clone(), reason: reason.to_owned() });
+        }
+    }
+    verdicts.sort_by_key(|v| v.outcome);
+    (verdicts, idle)
+}
+
+struct Progress<'a> {
+    observer: &'a dyn Observer,
+    done: usize,
+    total: usize,
+}
+
+impl Progress<'_> {
+    fn begin(&self, what: &str) {
+        self.observer.step(self.done, self.total, what);
+    }
+
+    fn end(&mut self) {
+        self.done += 1;
+    }
+}
+
+/// One scene made ready: geometry, twin, what the measure view sees.
+struct Set<'a> {
+    plan: &'a Plan<'a>,
+    scene: &'a Scene,
+    folder: &'a RecordFolder,
+    geometry: Geometry,
+    view: View,
+    gbuffer: GBuffer,
+    regions: Regions,
+}
+
+/// What the judge found, with its curve.
+struct Judged {
+    judge: Judge,
+    record: JudgeRecord,
+    curve: profile::Curve,
+}
+
+/// The images of one case.
+struct Images {
+    replicates: Vec<Vec<f32>>,
+    seconds: f64,
+}
+
+impl<'a> Set<'a> {
+    fn new(plan: &'a Plan<'a>, scene: &'a Scene, folder: &'a RecordFolder) -> Result<Self, RunError> {
+        let geometry = Geometry::new(scene).map_err(render_error(scene))?;
+        let view = scene.measure.view();
+        let gbuffer = GBuffer::new(&geometry.tracer, &view);
+        let regions = Regions::new(scene, &geometry.tracer, &gbuffer);
+        if regions.pixels(Region::All).is_empty() {
+            return Err(RunError::SeesNothing { scene: scene.name.clone() });
+        }
+        Ok(Set { plan, scene, folder, geometry, view, gbuffer, regions })
+    }
+
+    fn run(
+        &self,
+        cpu: &dyn Renderer,
+        gpu: Option<&dyn Renderer>,
+        progress: &mut Progress<'_>,
+        timing: &mut Timing,
+    ) -> Result<(SceneRecord, Vec<CaseRecord>), RunError> {
+        let methods = &self.plan.suite.methods;
+        let fail = render_error(self.scene);
+        let mut loaded_cpu = cpu.load(&self.geometry).map_err(&fail)?;
+        progress.begin(&format!("{}: judge", self.scene.name));
+        let judged = self.judge(timing)?;
+        progress.end();
+        let mut converged = Vec::with_capacity(methods.len());
+        for method in methods {
+            progress.begin(&format!("{}: converged {}", self.scene.name, method.name));
+            let job = Job {
+                view: &self.view,
+                estimator: method.estimator,
+                ao: self.scene.ao,
+                rays: self.plan.suite.file.converged_rays.get(),
+                seed: self.plan.seed.wrapping_add(CONVERGED),
+                replicate: 0,
+            };
+            converged.push(loaded_cpu.render(&job).map_err(&fail)?.values);
+            progress.end();
+        }
+        let mut loaded_gpu = gpu.map(|g| g.load(&self.geometry));
+        let mut images: BTreeMap<String, Result<Images, RenderError>> = BTreeMap::new();
+        for case in self.cases() {
+            progress.begin(&case.id());
+            let rendered = match (case.renderer.as_str(), &mut loaded_gpu) {
+                ("cpu", _) => Ok(self.replicates(case, loaded_cpu.as_mut()).map_err(&fail)?),
+                (_, Some(Ok(loaded))) => self.replicates(case, loaded.as_mut()),
+                (_, Some(Err(e))) => Err(RenderError::Device(e.to_string())),
+                (_, None) => Err(RenderError::NoAdapter("the plan asks for one".into())),
+            };
+            if let Ok(images) = &rendered {
+                timing.cases.insert(case.id(), images.seconds);
+            }
+            images.insert(case.id(), rendered);
+            progress.end();
+        }
+        let records = self.case_records(&images, &converged, judged.as_ref())?;
+        progress.begin(&format!("{}: pictures", self.scene.name));
+        let look = self.look(loaded_cpu.as_mut())?;
+        progress.end();
+        let record = self.scene_record(&images, &converged, judged, look)?;
+        Ok((record, records))
+    }
+
+    fn cases(&self) -> impl Iterator<Item = &'a Case> {
+        let (plan, name) = (self.plan, &self.scene.name);
+        plan.cases.iter().filter(move |c| c.scene == *name)
+    }
+
+    fn method(&self, case: &Case) -> usize {
+        self.plan.suite.methods.iter().position(|m| m.name == case.estimator).unwrap_or(0)
+    }
+
+    fn replicates(&self, case: &Case, loaded: &mut dyn Loaded) -> Result<Images, RenderError> {
+        let mut images = Images { replicates: Vec::new(), seconds: 0.0 };
+        for replicate in 0..self.plan.suite.file.replicates.get() {
+            let Frame { values, seconds, .. } = loaded.render(&Job {
+                view: &self.view,
+                estimator: self.plan.suite.methods[self.method(case)].estimator,
+                ao: self.scene.ao,
+                rays: case.rays,
+                seed: self.plan.seed,
+                replicate,
+            })?;
+            images.replicates.push(values);
+            images.seconds += seconds;
+        }
+        Ok(images)
+    }
+
+    /// Traces the scene and its twin, adding replicates until every region mean
+    /// is as precise as the suite asks.
+    fn judge(&self, timing: &mut Timing) -> Result<Option<Judged>, RunError> {
+        if !self.scene.has_occluder() {
+            return Ok(None);
+        }
+        let start = Instant::now();
+        let settings = &self.plan.suite.file.judge;
+        let no_regions = |e: crate::metrics::Absent| RunError::NoRegions { scene: self.scene.name.clone(), why: e.0 };
+        let twin = Geometry::new(&self.scene.twin()).map_err(render_error(self.scene))?;
+        let seed = self.plan.seed.wrapping_add(JUDGE);
+        let mut pairs: Vec<Pair> = Vec::new();
+        let judge = loop {
+            let first = pairs.len() as u32;
+            let last = (first + settings.replicates.get()).min(settings.max_replicates.get().max(2));
+            pairs.extend((first..last).map(|r| Pair {
+                with: path::irradiance(&self.geometry, &self.gbuffer, settings.paths.get(), seed, r),
+                without: path::irradiance(&twin, &self.gbuffer, settings.paths.get(), seed, r),
+            }));
+            let judge = Judge::new(&pairs, &self.regions).map_err(no_regions)?;
+            if judge.widest() <= settings.precision || last >= settings.max_replicates.get() {
+                break judge;
+            }
+        };
+        let image = format!("images/{}/judge.exr", self.scene.name);
+        let [with, without] = judge.irradiance.clone();
+        Layers::new(self.view.resolution)
+            .with("q", judge.q.clone())
+            .with("q-relative-se", judge.q_relative_se.clone())
+            .with("irradiance-with", with)
+            .with("irradiance-without", without)
+            .write(&self.folder.path().join(&image))?;
+        let q = [Region::Footprint, Region::Left, Region::Right]
+            .into_iter()
+            .filter_map(|region| {
+                let e = judge.q_of(region)?;
+                let [lo, hi] = e.interval(0.95);
+                Some((region, [e.value, lo, hi]))
+            })
+            .collect();
+        let record = JudgeRecord {
+            contrast: judge.contrast(),
+            q,
+            paths: settings.paths.get(),
+            replicates: pairs.len() as u32,
+            precision: judge.widest(),
+            wanted: settings.precision,
+            image,
+        };
+        let curve = profile::of_judge(&pairs, self.view.resolution[0] as usize);
+        timing.judges.insert(self.scene.name.clone(), start.elapsed().as_secs_f64());
+        Ok(Some(Judged { judge, record, curve }))
+    }
+
+    fn measured<'b>(&'b self, own: &'b Images, converged: &'b [f32]) -> Measured<'b> {
+        Measured { replicates: &own.replicates, converged, regions: &self.regions }
+    }
+
+    fn case_records(
+        &self,
+        images: &BTreeMap<String, Result<Images, RenderError>>,
+        converged: &[Vec<f32>],
+        judged: Option<&Judged>,
+    ) -> Result<Vec<CaseRecord>, RunError> {
+        let classic = &self.plan.suite.methods[self.plan.suite.classic()].name;
+        let of = |case: &Case| images.get(&case.id()).and_then(|i| i.as_ref().ok());
+        let mut records = Vec::new();
+        for case in self.cases() {
+            let own = match &images[&case.id()] {
+                Ok(own) => own,
+                Err(e) => {
+                    let error = Some(e.to_string());
+                    records.push(CaseRecord { case: case.clone(), error, image: None, hash: None, metrics: vec![] });
+                    continue;
+                }
+            };
+            let method = self.measured(own, &converged[self.method(case)]);
+            let on_classic = Case { estimator: classic.clone(), ..case.clone() };
+            let classic_method = of(&on_classic).map(|own| self.measured(own, &converged[self.method(&on_classic)]));
+            let on_cpu = Case { renderer: "cpu".into(), ..case.clone() };
+            let cpu = of(&on_cpu).filter(|_| case.renderer != "cpu").map(|i| i.replicates.as_slice());
+            let others = Others {
+                classic: classic_method.filter(|_| case.estimator != *classic),
+                cpu,
+                judge: judged.map(|j| &j.judge),
+            };
+            let (image, hash) = self.write_case(case, &own.replicates)?;
+            records.push(CaseRecord {
+                case: case.clone(),
+                error: None,
+                image: Some(image),
+                hash: Some(hash),
+                metrics: metrics(&method, &others),
+            });
+        }
+        Ok(records)
+    }
+
+    /// Writes mean, variance and replicates of a case; returns the path and the
+    /// hash of the mean.
+    fn write_case(&self, case: &Case, replicates: &[Vec<f32>]) -> Result<(String, String), RunError> {
+        let image = format!("images/{}/{}.{}.{}.exr", case.scene, case.estimator, case.renderer, case.rays);
+        let mut mean = Vec::with_capacity(self.view.pixels());
+        let mut variance = Vec::with_capacity(self.view.pixels());
+        for pixel in 0..self.view.pixels() {
+            let values: Vec<f64> = replicates.iter().map(|r| f64::from(r[pixel])).collect();
+            let (m, v) = mean_variance(&values);
+            mean.push(m as f32);
+            variance.push(v as f32);
+        }
+        let hash = pixel_hash(&mean);
+        let mut layers = Layers::new(self.view.resolution).with("mean", mean).with("variance", variance);
+        for (r, values) in replicates.iter().enumerate() {
+            layers = layers.with(&format!("replicate-{r:04}"), values.clone());
+        }
+        layers.write(&self.folder.path().join(&image))?;
+        Ok((image, hash))
+    }
+
+    /// Pictures from the look view: every method, and the path tracer.
+    fn look(&self, cpu: &mut dyn Loaded) -> Result<String, RunError> {
+        let view = self.scene.look.view();
+        let rays = self.plan.suite.file.look_rays.get();
+        let seed = self.plan.seed.wrapping_add(LOOK);
+        let mut layers = Layers::new(view.resolution);
+        for method in &self.plan.suite.methods {
+            let job = Job { view: &view, estimator: method.estimator, ao: self.scene.ao, rays, seed, replicate: 0 };
+            let frame = cpu.render(&job).map_err(render_error(self.scene))?;
+            layers = layers.with(&method.name, frame.values);
+        }
+        let gbuffer = GBuffer::new(&self.geometry.tracer, &view);
+        let layers = layers.with("path-traced", path::irradiance(&self.geometry, &gbuffer, rays, seed, 0));
+        let image = format!("images/{}/look.exr", self.scene.name);
+        layers.write(&self.folder.path().join(&image))?;
+        Ok(image)
+    }
+
+    fn scene_record(
+        &self,
+        images: &BTreeMap<String, Result<Images, RenderError>>,
+        converged: &[Vec<f32>],
+        judged: Option<Judged>,
+        look: String,
+    ) -> Result<SceneRecord, RunError> {
+        let methods = &self.plan.suite.methods;
+        let pixels = self.view.pixels();
+        let width = self.view.resolution[0];
+        let image = format!("images/{}/regions.exr", self.scene.name);
+        let mut layers = Layers::new(self.view.resolution);
+        for region in Region::ALL {
+            layers = layers.with(&format!("region-{}", region.label()), self.regions.mask(region, pixels));
+        }
+        let mut brighter = BTreeMap::new();
+        for (method, converged) in methods.iter().zip(converged) {
+            let measured = Measured { replicates: &[], converged, regions: &self.regions };
+            if let Ok(side) = measured.brighter() {
+                brighter.insert(method.name.clone(), side);
+            }
+            layers = layers.with(&format!("converged-{}", method.name), converged.clone());
+        }
+        layers.write(&self.folder.path().join(&image))?;
+        let most = self.plan.suite.file.rays.iter().map(|r| r.get()).max().unwrap_or(0);
+        let mut profiles: Vec<profile::Curve> = self
+            .cases()
+            .filter(|c| c.renderer == "cpu" && c.rays == most)
+            .filter_map(|c| {
+                let own = images.get(&c.id())?.as_ref().ok()?;
+                Some(profile::of_method(&c.estimator, &own.replicates, width as usize))
+            })
+            .collect();
+        let mut judge = None;
+        if let Some(judged) = judged {
+            brighter.insert(Judge::LABEL.to_owned(), judged.judge.brighter);
+            profiles.push(judged.curve);
+            judge = Some(judged.record);
+        }
+        let radius = f64::from(self.scene.ao.radius);
+        Ok(SceneRecord {
+            name: self.scene.name.clone(),
+            description: self.scene.description.clone(),
+            control: self.scene.control,
+            hash: self.scene.hash(),
+            radius,
+            secondary_radius: f64::from(self.scene.ao.secondary_radius),
+            triangles: self.geometry.tracer.triangles().len(),
+            resolution: self.view.resolution,
+            transect: (0..width).map(|x| f64::from(self.scene.measure.transect_at(x)) / radius).collect(),
+            regions: Region::ALL.into_iter().map(|r| (r, self.regions.pixels(r).len())).collect(),
+            brighter,
+            judge,
+            profiles,
+            image,
+            look,
+        })
+    }
+}
+
+/// What a case is compared with, where it is there.
+struct Others<'a> {
+    classic: Option<Measured<'a>>,
+    cpu: Option<&'a [Vec<f32>]>,
+    judge: Option<&'a Judge>,
+}
+
+/// Every metric of one case.
+fn metrics(method: &Measured<'_>, others: &Others<'_>) -> Vec<Metric> {
+    let mut metrics = error::openness(method);
+    metrics.extend(error::against_converged(method, Region::All));
+    if let Some(judge) = others.judge {
+        metrics.extend(method.contrasts());
+        metrics.push(method.contrast_error(judge));
+        if let Some(classic) = &others.classic {
+            metrics.push(method.removed(classic, judge));
+        }
+        for region in [Region::Footprint, Region::Left, Region::Right] {
+            metrics.extend(error::against_converged(method, region));
+            metrics.extend(error::against_judge(method, judge, region));
+        }
+    }
+    if let Some(classic) = &others.classic {
+        metrics.push(error::over_darkening(method, classic));
+    }
+    if let Some(cpu) = others.cpu {
+        metrics.push(error::renderer_difference(method.replicates, cpu, method.regions));
+    }
+    metrics
+}
+
+fn render_error(scene: &Scene) -> impl Fn(RenderError) -> RunError + use<> {
+    let scene = scene.name.clone();
+    move |source| RunError::Render { scene: scene.clone(), source }
+}

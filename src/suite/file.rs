@@ -1,0 +1,247 @@
+//! The suite file.
+
+use crate::{
+    gate::{Gate, Limit},
+    metrics::{MetricName, regions::Region},
+    render::{Estimator, ReceiverPlane},
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Deserializer, Serialize, de::Error};
+
+macro_rules! counted {
+    ($(#[$doc:meta])* $name:ident, $lo:literal ..= $hi:literal) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+        #[serde(transparent)]
+        pub struct $name(#[schemars(range(min = $lo, max = $hi))] u32);
+
+        impl $name {
+            /// The number.
+            pub fn get(self) -> u32 {
+                self.0
+            }
+        }
+
+        impl<'de> Deserialize<'de> for $name {
+            fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+                let value = i64::deserialize(d)?;
+                match u32::try_from(value) {
+                    Ok(v) if ($lo..=$hi).contains(&v) => Ok(Self(v)),
+                    _ => Err(D::Error::custom(format!(
+                        "{value} is out of range: it must be from {} to {}", $lo, $hi
+                    ))),
+                }
+            }
+        }
+    };
+}
+
+counted!(
+    /// Rays or paths a pixel.
+    Rays, 1..=65536
+);
+counted!(
+    /// Independent renders.
+    Replicates, 2..=1024
+);
+
+/// A suite file: what to render and what must hold.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SuiteFile {
+    /// What the suite is for.
+    pub description: String,
+    /// Built-in scenes by name, others by path (ending in `.toml`) from this file.
+    pub scenes: Vec<String>,
+    /// Primary rays a pixel; each is a case of its own.
+    pub rays: Vec<Rays>,
+    /// Independent renders of each case; intervals are taken over them.
+    pub replicates: Replicates,
+    /// Seed of all randomness; `--seed` overrides it.
+    #[serde(default = "one")]
+    pub seed: u32,
+    /// Rays of the converged images.
+    pub converged_rays: Rays,
+    /// Rays at which goldens are taken; none unless given.
+    pub golden_rays: Option<Rays>,
+    /// Rays and paths a pixel in pictures.
+    #[serde(default = "look_rays")]
+    pub look_rays: Rays,
+    /// How precise the judge must be.
+    #[serde(default)]
+    pub judge: JudgeSettings,
+    /// What the GPU renders where the only adapter is a software one.
+    #[serde(default)]
+    pub software_adapter: SoftwareAdapter,
+    /// The methods.
+    #[serde(rename = "estimator")]
+    pub estimators: Vec<EstimatorFile>,
+    /// What must hold.
+    #[serde(rename = "gate", default)]
+    pub gates: Vec<GateFile>,
+}
+
+fn one() -> u32 {
+    1
+}
+
+fn look_rays() -> Rays {
+    Rays(64)
+}
+
+/// `[judge]`: the path tracer goes on until each region mean is precise.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct JudgeSettings {
+    /// Half width of the 95 % interval of each region mean, relative.
+    pub precision: f64,
+    /// Paths a pixel in one replicate.
+    pub paths: Rays,
+    /// Replicates to begin with, and to add each time.
+    pub replicates: Replicates,
+    /// Replicates at which it gives up.
+    pub max_replicates: Replicates,
+}
+
+impl Default for JudgeSettings {
+    fn default() -> Self {
+        JudgeSettings { precision: 0.02, paths: Rays(16), replicates: Replicates(16), max_replicates: Replicates(128) }
+    }
+}
+
+/// `[software_adapter]`: each list empty means all.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct SoftwareAdapter {
+    /// Scenes by name.
+    pub scenes: Vec<String>,
+    /// Rays a pixel.
+    pub rays: Vec<Rays>,
+}
+
+/// `[[estimator]]`.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EstimatorFile {
+    /// Unique in the suite.
+    pub name: String,
+    /// The method.
+    pub kind: Kind,
+    /// For `extended`: whether the receiver closes secondary rays.
+    pub receiver_plane: Option<ReceiverPlane>,
+}
+
+/// The methods there are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Share of rays with no hit within R.
+    Classic,
+    /// The paper's extension.
+    Extended,
+}
+
+impl EstimatorFile {
+    pub(super) fn build(&self) -> Result<Estimator, String> {
+        match (self.kind, self.receiver_plane) {
+            (Kind::Classic, None) => Ok(Estimator::Classic),
+            (Kind::Classic, Some(_)) => {
+                Err(format!("estimator '{}': receiver_plane belongs to kind 'extended' only", self.name))
+            }
+            (Kind::Extended, Some(receiver_plane)) => Ok(Estimator::Extended { receiver_plane }),
+            (Kind::Extended, None) => {
+                Err(format!("estimator '{}': kind 'extended' needs receiver_plane, 'counts' or 'clipped'", self.name))
+            }
+        }
+    }
+}
+
+/// A finite limit.
+fn finite<'de, D: Deserializer<'de>>(d: D) -> Result<Option<f64>, D::Error> {
+    let value = f64::deserialize(d)?;
+    if value.is_finite() {
+        Ok(Some(value))
+    } else {
+        Err(D::Error::custom(format!("{value} is no limit: give a finite number")))
+    }
+}
+
+/// `[[gate]]`: a limit on a metric. Filters that are absent or empty let
+/// everything through.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GateFile {
+    /// What it makes sure of, in a sentence.
+    pub name: String,
+    /// The metric.
+    pub metric: MetricName,
+    /// The region, for metrics that are taken over one.
+    pub region: Option<Region>,
+    /// Scenes it holds for.
+    #[serde(default)]
+    pub scenes: Vec<String>,
+    /// Estimators it holds for.
+    #[serde(default)]
+    pub estimators: Vec<String>,
+    /// Renderers it holds for.
+    #[serde(default)]
+    pub renderers: Vec<String>,
+    /// Ray counts it holds for.
+    #[serde(default)]
+    pub rays: Vec<Rays>,
+    /// The value is at least this.
+    #[serde(default, deserialize_with = "finite")]
+    pub min: Option<f64>,
+    /// The value is at most this.
+    #[serde(default, deserialize_with = "finite")]
+    pub max: Option<f64>,
+    /// The value equals this, give or take `within`.
+    #[serde(default, deserialize_with = "finite")]
+    pub equals: Option<f64>,
+    /// The margin of `equals`.
+    #[serde(default, deserialize_with = "finite")]
+    pub within: Option<f64>,
+    /// Why this gate must fail. It is then shown as a known failure, and passing
+    /// is what fails.
+    pub known_failure: Option<String>,
+}
+
+impl GateFile {
+    pub(super) fn build(&self) -> Result<Gate, String> {
+        let limit = match (self.min, self.max, self.equals, self.within) {
+            (Some(v), None, None, None) => Limit::AtLeast(v),
+            (None, Some(v), None, None) => Limit::AtMost(v),
+            (None, None, Some(target), Some(within)) if within > 0.0 => Limit::Equals { target, within },
+            (None, None, Some(_), Some(_)) => return Err("within must be above 0".into()),
+            _ => return Err("give exactly one limit: min, max, or equals together with within".into()),
+        };
+        if matches!(self.metric, MetricName::JudgeBias | MetricName::JudgeRmse) {
+            return Err(format!(
+                "{} is reported but never gated: it measures the direction of light more than AO; gate contrast-error",
+                self.metric.label()
+            ));
+        }
+        let needs = matches!(self.metric, MetricName::Openness | MetricName::Bias | MetricName::Mae | MetricName::Rmse);
+        match (needs, self.region) {
+            (true, None) => return Err(format!("{} needs a region", self.metric.label())),
+            (false, Some(_)) => return Err(format!("{} takes no region: it has its own", self.metric.label())),
+            _ => {}
+        }
+        if self.metric == MetricName::JudgeContrast
+            && !(self.estimators.is_empty() && self.renderers.is_empty() && self.rays.is_empty())
+        {
+            return Err("judge-contrast belongs to a scene: filter by scenes only".into());
+        }
+        Ok(Gate {
+            name: self.name.clone(),
+            metric: self.metric,
+            region: self.region,
+            limit,
+            scenes: self.scenes.clone(),
+            estimators: self.estimators.clone(),
+            renderers: self.renderers.clone(),
+            rays: self.rays.iter().map(|r| r.get()).collect(),
+            known_failure: self.known_failure.clone(),
+        })
+    }
+}

@@ -1,0 +1,211 @@
+//! What to run: a suite file, checked as a whole, becomes a plan of cases.
+
+mod file;
+mod plan;
+
+pub use file::{GateFile, JudgeSettings, SuiteFile};
+pub use plan::{Case, Plan, Platform};
+
+use crate::{
+    gate::Gate,
+    render::Estimator,
+    scenes::{Scene, SceneError},
+};
+use std::path::Path;
+
+/// The built-in suites, by name.
+pub const BUILT_IN: [(&str, &str); 1] = [("thin-occluders", include_str!("thin-occluders.toml"))];
+
+/// A method under a name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Method {
+    /// Unique in its suite.
+    pub name: String,
+    /// What it computes.
+    pub estimator: Estimator,
+}
+
+/// A suite with its scenes loaded and everything checked against everything.
+#[derive(Clone, Debug)]
+pub struct Suite {
+    /// Name of the suite.
+    pub name: String,
+    /// Its settings as written.
+    pub file: SuiteFile,
+    /// Its scenes.
+    pub scenes: Vec<Scene>,
+    /// Its methods; one of them is `classic`.
+    pub methods: Vec<Method>,
+    /// Its gates.
+    pub gates: Vec<Gate>,
+}
+
+/// Why a suite cannot be run. The message names the file and the line or field.
+#[derive(Debug, thiserror::Error)]
+pub enum SuiteError {
+    /// The TOML is malformed, has an unknown key, or a value out of its range.
+    #[error("{file}: {source}")]
+    Toml {
+        /// The suite file.
+        file: String,
+        /// What and where.
+        source: Box<toml::de::Error>,
+    },
+    /// Each value is legal, but they do not go together.
+    #[error("{file}: {message}")]
+    Invalid {
+        /// The suite file.
+        file: String,
+        /// What, by field.
+        message: String,
+    },
+    /// The file cannot be read.
+    #[error("{file}: cannot read the suite file: {source}")]
+    Read {
+        /// The suite file.
+        file: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// There is neither a built-in suite nor a file of this name.
+    #[error("no built-in suite is called '{name}' and there is no such file; built in: {known}")]
+    Unknown {
+        /// The name asked for.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// A scene cannot be used.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+}
+
+impl Suite {
+    /// Loads a built-in suite by name or a suite file by path. Scenes that a file
+    /// names by path are looked up beside it.
+    ///
+    /// # Errors
+    /// [`SuiteError`], which names the file and the line or field.
+    pub fn load(name: &str) -> Result<Self, SuiteError> {
+        if let Some((_, text)) = BUILT_IN.iter().find(|(n, _)| *n == name) {
+            return Self::from_toml(name, &format!("{name}.toml (built in)"), text, Path::new("."));
+        }
+        let path = Path::new(name);
+        if !name.ends_with(".toml") && !path.exists() {
+            let known = BUILT_IN.map(|(n, _)| n).join(", ");
+            return Err(SuiteError::Unknown { name: name.to_owned(), known });
+        }
+        let text =
+            std::fs::read_to_string(path).map_err(|source| SuiteError::Read { file: name.to_owned(), source })?;
+        let stem = path.file_stem().map_or_else(|| name.to_owned(), |s| s.to_string_lossy().into_owned());
+        Self::from_toml(&stem, name, &text, path.parent().unwrap_or(Path::new(".")))
+    }
+
+    /// Reads a suite from TOML. `file` is what errors call it; scene paths are
+    /// relative to `folder`.
+    ///
+    /// # Errors
+    /// See [`Suite::load`].
+    pub fn from_toml(name: &str, file: &str, text: &str, folder: &Path) -> Result<Self, SuiteError> {
+        let parsed: SuiteFile =
+            toml::from_str(text).map_err(|e| SuiteError::Toml { file: file.to_owned(), source: Box::new(e) })?;
+        let invalid = |message: String| SuiteError::Invalid { file: file.to_owned(), message };
+        let mut scenes: Vec<Scene> = Vec::with_capacity(parsed.scenes.len());
+        for scene in &parsed.scenes {
+            let scene = if scene.ends_with(".toml") {
+                Scene::from_file(&folder.join(scene))?
+            } else {
+                aogauge_scenes::library::scene(scene)?
+            };
+            if scenes.iter().any(|s| s.name == scene.name) {
+                return Err(invalid(format!("scenes: '{}' is named twice", scene.name)));
+            }
+            scenes.push(scene);
+        }
+        let methods = methods(&parsed).map_err(invalid)?;
+        let mut gates = Vec::with_capacity(parsed.gates.len());
+        for gate in &parsed.gates {
+            let names = |list: &[String], known: &mut dyn Iterator<Item = &str>, field: &str| {
+                let known: Vec<&str> = known.collect();
+                match list.iter().find(|n| !known.contains(&n.as_str())) {
+                    Some(n) => Err(invalid(format!(
+                        "gate '{}': {field} names '{n}', which the suite does not have; it has {}",
+                        gate.name,
+                        known.join(", ")
+                    ))),
+                    None => Ok(()),
+                }
+            };
+            names(&gate.scenes, &mut scenes.iter().map(|s| s.name.as_str()), "scenes")?;
+            names(&gate.estimators, &mut methods.iter().map(|m| m.name.as_str()), "estimators")?;
+            names(&gate.renderers, &mut ["cpu", "gpu"].into_iter(), "renderers")?;
+            if let Some(r) = gate.rays.iter().find(|r| !parsed.rays.contains(r)) {
+                return Err(invalid(format!(
+                    "gate '{}': rays names {}, which the suite does not trace",
+                    gate.name,
+                    r.get()
+                )));
+            }
+            gates.push(gate.build().map_err(|e| invalid(format!("gate '{}': {e}", gate.name)))?);
+        }
+        Ok(Suite { name: name.to_owned(), file: parsed, scenes, methods, gates })
+    }
+
+    /// The index of the method that is classic AO.
+    pub fn classic(&self) -> usize {
+        self.methods.iter().position(|m| m.estimator == Estimator::Classic).unwrap_or(0)
+    }
+}
+
+fn methods(file: &SuiteFile) -> Result<Vec<Method>, String> {
+    let mut methods: Vec<Method> = Vec::new();
+    for entry in &file.estimators {
+        if methods.iter().any(|m| m.name == entry.name) {
+            return Err(format!("estimator: '{}' is named twice", entry.name));
+        }
+        methods.push(Method { name: entry.name.clone(), estimator: entry.build()? });
+    }
+    if !methods.iter().any(|m| m.estimator == Estimator::Classic) {
+        return Err("estimator: the suite needs one of kind 'classic', which the others are compared with".into());
+    }
+    Ok(methods)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_built_in_suites_load() {
+        for (name, _) in BUILT_IN {
+            let suite = Suite::load(name).unwrap_or_else(|e| panic!("{e}"));
+            assert_eq!(suite.scenes.len(), 7);
+            assert!(!suite.gates.is_empty());
+        }
+    }
+
+    fn with(extra: &str) -> Result<Suite, SuiteError> {
+        let text = format!(
+            "description = 'x'\nscenes = ['plane']\nrays = [4]\nreplicates = 4\nconverged_rays = 64\n{extra}\n\
+             [[estimator]]\nname = 'classic'\nkind = 'classic'\n"
+        );
+        Suite::from_toml("x", "x.toml", &text, Path::new("."))
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        assert!(with("").is_ok());
+        for (extra, says) in [
+            ("colour = 1", "colour"),
+            ("golden_rays = 0", "line 6"),
+            ("[[gate]]\nname = 'g'\nmetric = 'removed'", "min"),
+            ("[[gate]]\nname = 'g'\nmetric = 'removed'\nmin = 0.5\nscenes = ['plan']", "'plan'"),
+            ("[[gate]]\nname = 'g'\nmetric = 'bias'\nmax = 0.5", "region"),
+            ("[[gate]]\nname = 'g'\nmetric = 'judge-bias'\nregion = 'left'\nmax = 0.5", "never gated"),
+            ("[[gate]]\nname = 'g'\nmetric = 'removed'\nmin = nan", "finite"),
+        ] {
+            let message = with(extra).unwrap_err().to_string();
+            assert!(message.contains(says) && message.contains("x.toml"), "{extra}: {message}");
+        }
+    }
+}
