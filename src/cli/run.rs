@@ -3,7 +3,7 @@
 use super::{Exit, Failure, Format, json, print, tell};
 use crate::{
     record::{Machine, Record, RecordFolder},
-    render::{Renderer, cpu::Cpu},
+    render::{Renderer, cpu::Cpu, gpu::Gpu},
     report,
     run::{self, Observer},
     suite::{Plan, Platform, Suite},
@@ -70,13 +70,14 @@ fn bar() -> Bar {
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
     let suite = Suite::load(&args.suite)?;
+    let (gpu, missing) = open(args.renderer)?;
     let folder = RecordFolder::create(&args.out)?;
     let mut pool = rayon::ThreadPoolBuilder::new();
     if let Some(threads) = args.threads {
         pool = pool.num_threads(threads.into());
     }
     let pool = pool.build().map_err(|e| Failure::usage(format!("cannot start {:?} threads: {e}", args.threads)))?;
-    let record = pool.install(|| render(args, &suite, &folder))?;
+    let record = pool.install(|| render(args, &suite, gpu.as_ref(), &missing, &folder))?;
     report::write(folder.path(), folder.path())?;
     tell(&format!(
         "{}\n{}\n{}: {}",
@@ -91,20 +92,42 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     Ok(exit(&record))
 }
 
-fn render(args: &Args, suite: &Suite, folder: &RecordFolder) -> Result<Record, Failure> {
-    let gpu: Option<&dyn Renderer> = None;
-    let plan = Plan::new(suite, Platform::Cpu, args.seed);
+fn render(
+    args: &Args,
+    suite: &Suite,
+    gpu: Option<&Gpu>,
+    missing: &str,
+    folder: &RecordFolder,
+) -> Result<Record, Failure> {
+    let platform = match gpu {
+        None => Platform::Cpu,
+        Some(gpu) if gpu.is_software() && args.renderer == Choice::Auto => Platform::SoftwareGpu,
+        Some(_) => Platform::Gpu,
+    };
+    let plan = Plan::new(suite, platform, args.seed);
     let machine = Machine {
         os: std::env::consts::OS.to_owned(),
         arch: std::env::consts::ARCH.to_owned(),
         cpu: cpu_name(),
-        gpu: String::new(),
-        gpu_is_software: None,
+        gpu: gpu.map_or_else(|| missing.to_owned(), Gpu::describe),
+        gpu_is_software: gpu.map(Gpu::is_software),
     };
     let bar = bar();
-    let record = run::run(&plan, &Cpu, gpu, machine, folder, &bar)?;
+    let record = run::run(&plan, &Cpu, gpu.map(|g| g as &dyn Renderer), machine, folder, &bar)?;
     bar.0.finish_and_clear();
     Ok(record)
+}
+
+/// The GPU, or why there is none.
+fn open(choice: Choice) -> Result<(Option<Gpu>, String), Failure> {
+    match choice {
+        Choice::Cpu => Ok((None, "not asked for".to_owned())),
+        Choice::Gpu => Gpu::open().map(|g| (Some(g), String::new())).map_err(Failure::usage),
+        Choice::Auto => Ok(match Gpu::open() {
+            Ok(gpu) => (Some(gpu), String::new()),
+            Err(e) => (None, e.to_string()),
+        }),
+    }
 }
 
 fn cpu_name() -> String {

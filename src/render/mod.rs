@@ -4,6 +4,7 @@
 pub mod ao;
 pub mod cpu;
 pub mod gbuffer;
+pub mod gpu;
 pub mod path;
 pub mod sampler;
 
