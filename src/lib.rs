@@ -4,6 +4,7 @@ pub mod cli;
 pub mod disk;
 pub mod flatland;
 pub mod gate;
+pub mod golden;
 pub mod layers;
 pub mod metrics;
 pub mod record;

@@ -5,6 +5,7 @@ use clap::Parser;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    quiet_mesa();
     let exit = match Cli::parse().execute() {
         Ok(exit) => exit,
         Err(failure) => {
@@ -20,3 +21,14 @@ fn main() -> ExitCode {
 
 // clap exits with 2 on wrong usage by itself.
 const _: () = assert!(Exit::Usage as u8 == 2);
+
+/// Mesa's device-select layer looks for a desktop and prints an error where there
+/// is none; aogauge picks its adapter itself and opens no window.
+fn quiet_mesa() {
+    if std::env::var_os("NODEVICE_SELECT").is_none() {
+        // SAFETY: the first thing main does, so no other thread can be reading or
+        // writing the environment. Tested by `tests/cli.rs`, which runs the
+        // program and finds standard error free of it.
+        unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
+    }
+}

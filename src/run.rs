@@ -128,7 +128,7 @@ fn suite_info(suite: &Suite) -> SuiteInfo {
         description: suite.file.description.clone(),
         replicates: suite.file.replicates.get(),
         converged_rays: suite.file.converged_rays.get(),
-        golden_rays: suite.file.golden_rays.map(|r| r.get()),
+        golden_rays: suite.file.golden_rays.map(crate::suite::Rays::get),
         estimators: suite.methods.iter().map(|m| m.name.clone()).collect(),
         classic: suite.methods[suite.classic()].name.clone(),
     }

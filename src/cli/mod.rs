@@ -1,5 +1,6 @@
 //! The command line: one file a verb, and what they share: exit codes.
 
+mod golden;
 mod report;
 mod run;
 mod scene;
@@ -31,9 +32,11 @@ pub enum Exit {
 /// Judges the image quality of ambient-occlusion renderers.
 #[derive(Debug, Parser)]
 #[command(name = "aogauge", version, about, max_term_width = 100)]
-#[command(after_help = "Examples:\n  aogauge run\n  aogauge run --out reports/mine --seed 7\n\n\
+#[command(
+    after_help = "Examples:\n  aogauge run\n  aogauge run --out reports/mine --seed 7\n  aogauge golden verify reports/mine\n\n\
 Exit codes: 0 pass, 1 gate failed, 2 usage or configuration, 3 golden missing or unreadable,\n\
-4 nothing selected, 5 run incomplete, 6 inconclusive.")]
+4 nothing selected, 5 run incomplete, 6 inconclusive."
+)]
 pub struct Cli {
     #[command(subcommand)]
     verb: Verb,
@@ -43,6 +46,8 @@ pub struct Cli {
 enum Verb {
     Run(run::Args),
     Report(report::Args),
+    #[command(subcommand)]
+    Golden(golden::Verb),
     #[command(subcommand)]
     Scene(scene::Verb),
     Schema(schema::Args),
@@ -68,8 +73,8 @@ pub struct Failure {
 }
 
 impl Failure {
-    fn usage(message: impl ToString) -> Self {
-        Failure { exit: Exit::Usage, message: message.to_string() }
+    fn usage(message: impl Into<String>) -> Self {
+        Failure { exit: Exit::Usage, message: message.into() }
     }
 }
 
@@ -77,7 +82,7 @@ macro_rules! usage {
     ($($error:ty),*) => {$(
         impl From<$error> for Failure {
             fn from(e: $error) -> Self {
-                Failure::usage(e)
+                Failure::usage(e.to_string())
             }
         }
     )*};
@@ -93,6 +98,7 @@ impl Cli {
         match self.verb {
             Verb::Run(args) => run::execute(&args),
             Verb::Report(args) => report::execute(&args),
+            Verb::Golden(verb) => golden::execute(&verb),
             Verb::Scene(verb) => scene::execute(&verb),
             Verb::Schema(args) => schema::execute(&args),
         }
@@ -118,5 +124,5 @@ fn tell(text: &str) {
 }
 
 fn json(value: &impl serde::Serialize) -> Result<String, Failure> {
-    serde_json::to_string_pretty(value).map(|s| s + "\n").map_err(Failure::usage)
+    serde_json::to_string_pretty(value).map(|s| s + "\n").map_err(|e| Failure::usage(e.to_string()))
 }

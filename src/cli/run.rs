@@ -122,7 +122,7 @@ fn render(
 fn open(choice: Choice) -> Result<(Option<Gpu>, String), Failure> {
     match choice {
         Choice::Cpu => Ok((None, "not asked for".to_owned())),
-        Choice::Gpu => Gpu::open().map(|g| (Some(g), String::new())).map_err(Failure::usage),
+        Choice::Gpu => Gpu::open().map(|g| (Some(g), String::new())).map_err(|e| Failure::usage(e.to_string())),
         Choice::Auto => Ok(match Gpu::open() {
             Ok(gpu) => (Some(gpu), String::new()),
             Err(e) => (None, e.to_string()),

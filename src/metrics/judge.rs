@@ -119,9 +119,13 @@ impl Judge {
 
     /// Whether a pixel of Q is too noisy to show.
     pub fn masked(&self, pixel: usize) -> bool {
-        // NaN is masked too.
-        !(f64::from(self.q_relative_se[pixel]) <= MASK_ABOVE)
+        too_noisy(self.q_relative_se[pixel])
     }
+}
+
+/// Whether a relative standard error of Q asks for the mask; an unknown one does.
+pub fn too_noisy(relative_se: f32) -> bool {
+    relative_se.is_nan() || f64::from(relative_se) > MASK_ABOVE
 }
 
 /// A ratio of means of paired values with its standard error by linearisation:

@@ -9,6 +9,7 @@ pub mod table;
 use crate::{
     disk::{DiskError, write_whole},
     layers::Layers,
+    metrics::judge::too_noisy,
     record::{Record, SceneRecord},
 };
 use std::{io::Write, path::Path};
@@ -88,8 +89,7 @@ fn pictures(folder: &Path, record: &Record, scene: &SceneRecord, out: &Path) -> 
         let mut q = layer(&layers, &judge.image, "q")?;
         let se = layer(&layers, &judge.image, "q-relative-se")?;
         for (q, se) in q.iter_mut().zip(se) {
-            // NaN is masked too.
-            if !(f64::from(se) <= crate::metrics::judge::MASK_ABOVE) {
+            if too_noisy(se) {
                 *q = f32::NAN;
             }
         }

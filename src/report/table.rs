@@ -51,7 +51,7 @@ pub fn value_text(value: Option<f64>, interval: Option<[f64; 2]>) -> String {
 
 /// The case of a verdict, or `scene (judge)`.
 pub fn subject(verdict: &Verdict) -> String {
-    verdict.case.as_ref().map_or_else(|| format!("{} (judge)", verdict.scene), |c| c.id())
+    verdict.case.as_ref().map_or_else(|| format!("{} (judge)", verdict.scene), crate::suite::Case::id)
 }
 
 /// How far inside its limit a verdict's value lies; negative outside.

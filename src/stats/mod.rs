@@ -7,6 +7,7 @@ mod jackknife;
 mod tests_of_means;
 
 pub use jackknife::{Group, jackknife};
+pub(crate) use tests_of_means::welch_of_moments;
 pub use tests_of_means::{Welch, sidak_alpha, tost, welch};
 
 use statrs::distribution::{ContinuousCDF, StudentsT};

@@ -3,7 +3,7 @@
 mod file;
 mod plan;
 
-pub use file::{GateFile, JudgeSettings, SuiteFile};
+pub use file::{EstimatorFile, GateFile, JudgeSettings, Kind, Rays, Replicates, SoftwareAdapter, SuiteFile};
 pub use plan::{Case, Plan, Platform};
 
 use crate::{

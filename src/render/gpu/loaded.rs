@@ -13,6 +13,15 @@ use wgpu::util::DeviceExt;
 const RAYS_SOFTWARE: u64 = 1 << 19;
 const RAYS_HARDWARE: u64 = 1 << 23;
 
+/// Rays that one invocation traces at most. Mesa's software driver stops every
+/// loop of an invocation after 65,535 iterations in all, without a word; with 32
+/// rays, each with its two secondary rays may take 680 steps. The shader marks
+/// pixels where it happened all the same.
+const RAYS_AN_INVOCATION: u32 = 32;
+
+/// What the shader writes where its loops were stopped early.
+const STOPPED: u32 = u32::MAX;
+
 /// Threads of a workgroup, as the shader says.
 const WORKGROUP: u32 = 64;
 
@@ -284,6 +293,11 @@ impl Loaded for LoadedGpu<'_> {
             self.dispatch(job, &images, timer.as_ref());
             let halves: Vec<u32> = self.read(&images.halves)?;
             let wall = start.elapsed().as_secs_f64();
+            if halves.contains(&STOPPED) {
+                return Err(RenderError::Device(
+                    "the driver stopped a loop of the shader early: the scene is too deep for it".into(),
+                ));
+            }
             let surfaces: Vec<Surface> = self.read(&images.surfaces)?;
             let decisions = self.read(&images.decisions)?;
             let seconds = match (&timer, self.gpu.tick) {
@@ -316,10 +330,10 @@ impl Loaded for LoadedGpu<'_> {
 /// A range of pixels and a range of rays.
 type Piece = (std::ops::Range<u32>, std::ops::Range<u32>);
 
-/// Splits a job so that no piece has more than `budget` rays (or one ray a
-/// workgroup, where the budget is smaller).
+/// Splits a job so that no piece has more than `budget` rays, and no invocation
+/// more than [`RAYS_AN_INVOCATION`].
 fn pieces(pixels: u32, rays: u32, budget: u64) -> Vec<Piece> {
-    let ray_step = u64::from(rays).min(budget / u64::from(WORKGROUP)).max(1) as u32;
+    let ray_step = rays.clamp(1, RAYS_AN_INVOCATION);
     // At most 65,535 workgroups a dispatch.
     let pixel_step = (budget / u64::from(ray_step)).clamp(u64::from(WORKGROUP), 65_535 * u64::from(WORKGROUP)) as u32;
     let mut pieces = Vec::new();
@@ -363,13 +377,14 @@ mod tests {
     #[test]
     fn pieces_cover_every_ray_of_every_pixel_once() {
         for (pixels, rays, budget) in
-            [(1u32, 1u32, 64u64), (6656, 32, 1 << 19), (6656, 512, 1 << 12), (100, 70_000, 1 << 19)]
+            [(1u32, 1u32, 64u64), (6656, 32, 1 << 19), (6656, 512, 1 << 14), (100, 70_000, 1 << 19)]
         {
             let pieces = pieces(pixels, rays, budget);
             let total: u64 = pieces.iter().map(|(p, r)| p.len() as u64 * r.len() as u64).sum();
             assert_eq!(total, u64::from(pixels) * u64::from(rays));
             for (p, r) in &pieces {
-                assert!(p.len() as u64 * r.len() as u64 <= budget.max(u64::from(WORKGROUP)));
+                assert!(p.len() as u64 * r.len() as u64 <= budget.max(u64::from(WORKGROUP * RAYS_AN_INVOCATION)));
+                assert!(r.len() as u32 <= RAYS_AN_INVOCATION);
             }
         }
     }

@@ -42,6 +42,8 @@ struct Decisions {
 @group(0) @binding(4) var<storage, read_write> halves: array<u32>;
 @group(0) @binding(5) var<storage, read_write> decisions: array<Decisions>;
 
+const STOPPED = 0xffffffffu;
+
 @compute @workgroup_size(64)
 fn see(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= params.pixels {
@@ -119,6 +121,7 @@ fn open_halves(@builtin(global_invocation_id) id: vec3<u32>) {
     let frame = tangents(surface.normal);
     let sampler = sampler_seed(params.seed, pixel, params.replicate);
     var open = 0u;
+    var done = 0u;
     var decided = decisions[pixel];
     for (var i = params.first_ray; i < params.first_ray + params.rays; i++) {
         let closed = decide(origin, surface.normal, frame[0], frame[1], pair(sampler, i, 0u));
@@ -130,6 +133,13 @@ fn open_halves(@builtin(global_invocation_id) id: vec3<u32>) {
             decided.first |= ((closed >> 1u) & 1u) << i;
             decided.second |= ((closed >> 2u) & 1u) << i;
         }
+        done++;
+    }
+    // Mesa's software driver stops all loops of an invocation after 65,535
+    // iterations; what it has then is wrong and must not pass.
+    if done != params.rays || halves[pixel] == STOPPED {
+        halves[pixel] = STOPPED;
+        return;
     }
     halves[pixel] += open;
     decisions[pixel] = decided;
