@@ -92,6 +92,28 @@ pub struct Machine {
     pub gpu_is_software: Option<bool>,
 }
 
+impl Machine {
+    /// This machine, with what is known of its GPU.
+    pub fn here(gpu: String, gpu_is_software: Option<bool>) -> Self {
+        Machine {
+            os: std::env::consts::OS.to_owned(),
+            arch: std::env::consts::ARCH.to_owned(),
+            cpu: cpu_name(),
+            gpu,
+            gpu_is_software,
+        }
+    }
+}
+
+/// The processor's name, where the system tells.
+pub fn cpu_name() -> String {
+    let name = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
+        let line = text.lines().find(|l| l.starts_with("model name"))?;
+        Some(line.split_once(':')?.1.trim().to_owned())
+    });
+    name.unwrap_or_else(|| format!("{} processor", std::env::consts::ARCH))
+}
+
 /// Counts of verdicts and cases.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -163,6 +185,9 @@ pub struct SceneRecord {
     pub brighter: BTreeMap<String, Brighter>,
     /// The judge; null where there is no occluder to judge.
     pub judge: Option<JudgeRecord>,
+    /// Why there is no judge.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub no_judge: Option<String>,
     /// Openness along the transect on the CPU at the most rays, and Q.
     pub profiles: Vec<Curve>,
     /// Region masks and converged images, relative to the record.

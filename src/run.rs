@@ -5,7 +5,7 @@ use crate::{
     gate::Verdict,
     layers::{Layers, pixel_hash},
     metrics::{
-        Metric,
+        Absent, Metric,
         artifact::Method as Measured,
         error,
         judge::{Judge, Pair},
@@ -50,14 +50,6 @@ pub enum RunError {
     SeesNothing {
         /// The scene.
         scene: String,
-    },
-    /// There is a judge to be asked but nothing to ask about.
-    #[error("scene '{scene}': {why}; check the occluder, measure.transect and measure.resolution")]
-    NoRegions {
-        /// The scene.
-        scene: String,
-        /// Which region is missing.
-        why: String,
     },
 }
 
@@ -140,9 +132,10 @@ fn verdicts(plan: &Plan<'_>, scenes: &[SceneRecord], cases: &[CaseRecord]) -> (V
     for gate in &plan.suite.gates {
         let before = verdicts.len();
         for scene in scenes.iter().filter(|s| gate.applies_to_judge(&s.name)) {
-            let missing =
-                || Metric::new(gate.metric, None, Err(crate::metrics::Absent("the scene has no occluder".into())));
-            let metric = scene.judge.as_ref().map_or_else(missing, |j| j.contrast.clone());
+            let metric = match &scene.judge {
+                Some(judge) => judge.contrast.clone(),
+                None => Metric::new(gate.metric, None, Err(Absent(scene.no_judge.clone().unwrap_or_default()))),
+            };
             verdicts.push(gate.verdict(&scene.name, None, &metric));
         }
         let mut failed = 0;
@@ -262,7 +255,7 @@ impl<'a> Set<'a> {
             images.insert(case.id(), rendered);
             progress.end();
         }
-        let records = self.case_records(&images, &converged, judged.as_ref())?;
+        let records = self.case_records(&images, &converged, &judged)?;
         progress.begin(&format!("{}: pictures", self.scene.name));
         let look = self.look(loaded_cpu.as_mut())?;
         progress.end();
@@ -298,13 +291,15 @@ impl<'a> Set<'a> {
 
     /// Traces the scene and its twin, adding replicates until every region mean
     /// is as precise as the suite asks.
-    fn judge(&self, timing: &mut Timing) -> Result<Option<Judged>, RunError> {
+    fn judge(&self, timing: &mut Timing) -> Result<Result<Judged, Absent>, RunError> {
         if !self.scene.has_occluder() {
-            return Ok(None);
+            return Ok(Err(Absent("the scene has no occluder to judge".into())));
+        }
+        if let Some(small) = Judge::REGIONS.into_iter().find_map(|r| self.regions.measurable(r).err()) {
+            return Ok(Err(small));
         }
         let start = Instant::now();
         let settings = &self.plan.suite.file.judge;
-        let no_regions = |e: crate::metrics::Absent| RunError::NoRegions { scene: self.scene.name.clone(), why: e.0 };
         let twin = Geometry::new(&self.scene.twin()).map_err(render_error(self.scene))?;
         let seed = self.plan.seed.wrapping_add(JUDGE);
         let mut pairs: Vec<Pair> = Vec::new();
@@ -315,7 +310,10 @@ impl<'a> Set<'a> {
                 with: path::irradiance(&self.geometry, &self.gbuffer, settings.paths.get(), seed, r),
                 without: path::irradiance(&twin, &self.gbuffer, settings.paths.get(), seed, r),
             }));
-            let judge = Judge::new(&pairs, &self.regions).map_err(no_regions)?;
+            let judge = match Judge::new(&pairs, &self.regions) {
+                Ok(judge) => judge,
+                Err(absent) => return Ok(Err(absent)),
+            };
             if judge.widest() <= settings.precision || last >= settings.max_replicates.get() {
                 break judge;
             }
@@ -328,7 +326,7 @@ impl<'a> Set<'a> {
             .with("irradiance-with", with)
             .with("irradiance-without", without)
             .write(&self.folder.path().join(&image))?;
-        let q = [Region::Footprint, Region::Left, Region::Right]
+        let q = Judge::REGIONS
             .into_iter()
             .filter_map(|region| {
                 let e = judge.q_of(region)?;
@@ -347,7 +345,7 @@ impl<'a> Set<'a> {
         };
         let curve = profile::of_judge(&pairs, self.view.resolution[0] as usize);
         timing.judges.insert(self.scene.name.clone(), start.elapsed().as_secs_f64());
-        Ok(Some(Judged { judge, record, curve }))
+        Ok(Ok(Judged { judge, record, curve }))
     }
 
     fn measured<'b>(&'b self, own: &'b Images, converged: &'b [f32]) -> Measured<'b> {
@@ -358,7 +356,7 @@ impl<'a> Set<'a> {
         &self,
         images: &BTreeMap<String, Result<Images, RenderError>>,
         converged: &[Vec<f32>],
-        judged: Option<&Judged>,
+        judged: &Result<Judged, Absent>,
     ) -> Result<Vec<CaseRecord>, RunError> {
         let classic = &self.plan.suite.methods[self.plan.suite.classic()].name;
         let of = |case: &Case| images.get(&case.id()).and_then(|i| i.as_ref().ok());
@@ -380,7 +378,8 @@ impl<'a> Set<'a> {
             let others = Others {
                 classic: classic_method.filter(|_| case.estimator != *classic),
                 cpu,
-                judge: judged.map(|j| &j.judge),
+                judge: judged.as_ref().map(|j| &j.judge).map_err(Clone::clone),
+                occluder: self.scene.has_occluder(),
             };
             let (image, hash) = self.write_case(case, &own.replicates)?;
             records.push(CaseRecord {
@@ -437,7 +436,7 @@ impl<'a> Set<'a> {
         &self,
         images: &BTreeMap<String, Result<Images, RenderError>>,
         converged: &[Vec<f32>],
-        judged: Option<Judged>,
+        judged: Result<Judged, Absent>,
         look: String,
     ) -> Result<SceneRecord, RunError> {
         let methods = &self.plan.suite.methods;
@@ -466,12 +465,14 @@ impl<'a> Set<'a> {
                 Some(profile::of_method(&c.estimator, &own.replicates, width as usize))
             })
             .collect();
-        let mut judge = None;
-        if let Some(judged) = judged {
-            brighter.insert(Judge::LABEL.to_owned(), judged.judge.brighter);
-            profiles.push(judged.curve);
-            judge = Some(judged.record);
-        }
+        let (judge, no_judge) = match judged {
+            Ok(judged) => {
+                brighter.insert(Judge::LABEL.to_owned(), judged.judge.brighter);
+                profiles.push(judged.curve);
+                (Some(judged.record), None)
+            }
+            Err(Absent(why)) => (None, Some(why)),
+        };
         let radius = f64::from(self.scene.ao.radius);
         Ok(SceneRecord {
             name: self.scene.name.clone(),
@@ -486,6 +487,7 @@ impl<'a> Set<'a> {
             regions: Region::ALL.into_iter().map(|r| (r, self.regions.pixels(r).len())).collect(),
             brighter,
             judge,
+            no_judge,
             profiles,
             image,
             look,
@@ -497,22 +499,25 @@ impl<'a> Set<'a> {
 struct Others<'a> {
     classic: Option<Measured<'a>>,
     cpu: Option<&'a [Vec<f32>]>,
-    judge: Option<&'a Judge>,
+    judge: Result<&'a Judge, Absent>,
+    /// Whether the scene has an occluder, so that it should have a judge.
+    occluder: bool,
 }
 
 /// Every metric of one case.
 fn metrics(method: &Measured<'_>, others: &Others<'_>) -> Vec<Metric> {
     let mut metrics = error::openness(method);
     metrics.extend(error::against_converged(method, Region::All));
-    if let Some(judge) = others.judge {
+    if others.occluder {
+        let judge = others.judge.clone();
         metrics.extend(method.contrasts());
-        metrics.push(method.contrast_error(judge));
+        metrics.push(method.contrast_error(judge.clone()));
         if let Some(classic) = &others.classic {
-            metrics.push(method.removed(classic, judge));
+            metrics.push(method.removed(classic, judge.clone()));
         }
-        for region in [Region::Footprint, Region::Left, Region::Right] {
+        for region in Judge::REGIONS {
             metrics.extend(error::against_converged(method, region));
-            metrics.extend(error::against_judge(method, judge, region));
+            metrics.extend(error::against_judge(method, judge.clone(), region));
         }
     }
     if let Some(classic) = &others.classic {

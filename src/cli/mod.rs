@@ -1,5 +1,6 @@
 //! The command line: one file a verb, and what they share: exit codes.
 
+mod doctor;
 mod golden;
 mod report;
 mod run;
@@ -50,6 +51,7 @@ enum Verb {
     Golden(golden::Verb),
     #[command(subcommand)]
     Scene(scene::Verb),
+    Doctor(doctor::Args),
     Schema(schema::Args),
 }
 
@@ -100,6 +102,7 @@ impl Cli {
             Verb::Report(args) => report::execute(&args),
             Verb::Golden(verb) => golden::execute(&verb),
             Verb::Scene(verb) => scene::execute(&verb),
+            Verb::Doctor(args) => doctor::execute(&args),
             Verb::Schema(args) => schema::execute(&args),
         }
     }

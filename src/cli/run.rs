@@ -105,13 +105,7 @@ fn render(
         Some(_) => Platform::Gpu,
     };
     let plan = Plan::new(suite, platform, args.seed);
-    let machine = Machine {
-        os: std::env::consts::OS.to_owned(),
-        arch: std::env::consts::ARCH.to_owned(),
-        cpu: cpu_name(),
-        gpu: gpu.map_or_else(|| missing.to_owned(), Gpu::describe),
-        gpu_is_software: gpu.map(Gpu::is_software),
-    };
+    let machine = Machine::here(gpu.map_or_else(|| missing.to_owned(), Gpu::describe), gpu.map(Gpu::is_software));
     let bar = bar();
     let record = run::run(&plan, &Cpu, gpu.map(|g| g as &dyn Renderer), machine, folder, &bar)?;
     bar.0.finish_and_clear();
@@ -128,16 +122,6 @@ fn open(choice: Choice) -> Result<(Option<Gpu>, String), Failure> {
             Err(e) => (None, e.to_string()),
         }),
     }
-}
-
-fn cpu_name() -> String {
-    std::fs::read_to_string("/proc/cpuinfo")
-        .ok()
-        .and_then(|text| {
-            let line = text.lines().find(|l| l.starts_with("model name"))?;
-            Some(line.split_once(':')?.1.trim().to_owned())
-        })
-        .unwrap_or_else(|| "unnamed processor".to_owned())
 }
 
 fn exit(record: &Record) -> Exit {

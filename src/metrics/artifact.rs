@@ -81,13 +81,13 @@ impl Method<'_> {
     }
 
     /// dK = K - K(Q), with its reading as the note where it is clearly not zero.
-    pub fn contrast_error(&self, judge: &Judge) -> Metric {
-        let estimate = self.rows().map(|rows| {
-            jackknife(&[rows, judge.means.clone()], |m| {
+    pub fn contrast_error(&self, judge: Result<&Judge, Absent>) -> Metric {
+        let estimate = judge.clone().and_then(|judge| {
+            Ok(jackknife(&[self.rows()?, judge.means.clone()], |m| {
                 contrast(m[0][0], m[0][1]) - contrast_of_means(&m[1], judge.brighter)
-            })
+            }))
         });
-        let reading = estimate.as_ref().ok().and_then(|e| reading(e, judge.contrast().value?));
+        let reading = estimate.as_ref().ok().zip(judge.ok()).and_then(|(e, j)| reading(e, j.contrast().value?));
         let mut metric = Metric::new(MetricName::ContrastError, None, estimate);
         if metric.value.is_some() {
             metric.note = reading.map(str::to_owned);
@@ -97,12 +97,12 @@ impl Method<'_> {
 
     /// 1 - max(0, dK) / dK(classic). The two methods share their seeds, so
     /// replicates are paired.
-    pub fn removed(&self, classic: &Method<'_>, judge: &Judge) -> Metric {
-        Metric::new(MetricName::Removed, None, self.removed_estimate(classic, judge))
+    pub fn removed(&self, classic: &Method<'_>, judge: Result<&Judge, Absent>) -> Metric {
+        Metric::new(MetricName::Removed, None, judge.and_then(|judge| self.removed_estimate(classic, judge)))
     }
 
     fn removed_estimate(&self, classic: &Method<'_>, judge: &Judge) -> Result<Estimate, Absent> {
-        let error = classic.contrast_error(judge);
+        let error = classic.contrast_error(Ok(judge));
         let clear = error.estimate().is_some_and(|e| e.interval(0.95)[0] > 0.0);
         if !clear {
             return Err(Absent("classic shows no false highlight here, so there is nothing to remove".into()));

@@ -5,7 +5,7 @@ use super::{
     Absent, Metric, MetricName,
     artifact::Method,
     judge::Judge,
-    regions::{Region, Regions},
+    regions::{MIN_PIXELS, Region, Regions},
 };
 use crate::stats::Estimate;
 
@@ -52,25 +52,31 @@ pub fn against_converged(method: &Method<'_>, region: Region) -> [Metric; 3] {
 
 /// The physical error of a region: mean openness less the region's Q, and the
 /// root mean square of O - Q over the pixels whose Q is not masked.
-pub fn against_judge(method: &Method<'_>, judge: &Judge, region: Region) -> [Metric; 2] {
-    let bias = judge.q_of(region).ok_or_else(|| Absent("the judge has no such region".into())).and_then(|q| {
-        let o = over_replicates(method.replicates, |_, image| method.regions.mean(region, image))?;
-        let variance = o.se * o.se + q.se * q.se;
-        let welch = o.se.powi(4) / o.df + q.se.powi(4) / q.df;
-        let df = if welch > 0.0 { variance * variance / welch } else { 1.0 };
-        Ok(Estimate { value: o.value - q.value, se: variance.sqrt(), df })
-    });
-    let pixels: Vec<u32> =
-        method.regions.pixels(region).iter().copied().filter(|&i| !judge.masked(i as usize)).collect();
-    let rmse = if pixels.len() < super::regions::MIN_PIXELS {
-        Err(Absent(format!("only {} pixels of Q are not masked", pixels.len())))
-    } else {
-        over_replicates(method.replicates, |_, image| {
-            let sum: f64 = pixels.iter().map(|&i| f64::from(image[i as usize] - judge.q[i as usize]).powi(2)).sum();
-            Ok((sum / pixels.len() as f64).sqrt())
-        })
-    };
+pub fn against_judge(method: &Method<'_>, judge: Result<&Judge, Absent>, region: Region) -> [Metric; 2] {
+    let bias = judge.clone().and_then(|judge| judge_bias(method, judge, region));
+    let rmse = judge.and_then(|judge| judge_rmse(method, judge, region));
     [Metric::new(MetricName::JudgeBias, Some(region), bias), Metric::new(MetricName::JudgeRmse, Some(region), rmse)]
+}
+
+fn judge_bias(method: &Method<'_>, judge: &Judge, region: Region) -> Result<Estimate, Absent> {
+    let q = judge.q_of(region).ok_or_else(|| Absent("the judge has no such region".into()))?;
+    let o = over_replicates(method.replicates, |_, image| method.regions.mean(region, image))?;
+    let variance = o.se * o.se + q.se * q.se;
+    let welch = o.se.powi(4) / o.df + q.se.powi(4) / q.df;
+    let df = if welch > 0.0 { variance * variance / welch } else { 1.0 };
+    Ok(Estimate { value: o.value - q.value, se: variance.sqrt(), df })
+}
+
+fn judge_rmse(method: &Method<'_>, judge: &Judge, region: Region) -> Result<Estimate, Absent> {
+    let pixels: Vec<usize> =
+        method.regions.pixels(region).iter().map(|&i| i as usize).filter(|&i| !judge.masked(i)).collect();
+    if pixels.len() < MIN_PIXELS {
+        return Err(Absent(format!("only {} pixels of Q are not masked", pixels.len())));
+    }
+    over_replicates(method.replicates, |_, image| {
+        let sum: f64 = pixels.iter().map(|&i| f64::from(image[i] - judge.q[i]).powi(2)).sum();
+        Ok((sum / pixels.len() as f64).sqrt())
+    })
 }
 
 /// Mean of O(classic) - O over the whole image, replicates paired by seed.

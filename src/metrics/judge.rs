@@ -22,9 +22,6 @@ pub struct Pair {
     pub without: Vec<f32>,
 }
 
-/// Columns of a judge group: E_with and E_without of footprint, left and right.
-const COLUMNS: [Region; 3] = [Region::Footprint, Region::Left, Region::Right];
-
 /// Everything metrics need of the judge: region means a replicate, and images.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judge {
@@ -52,6 +49,10 @@ pub fn contrast_of_means(means: &[f64], brighter: Brighter) -> f64 {
 }
 
 impl Judge {
+    /// The regions the judge speaks of, in the order of a group's columns: first
+    /// their E_with, then their E_without.
+    pub const REGIONS: [Region; 3] = [Region::Footprint, Region::Left, Region::Right];
+
     /// Works out the judge from its replicates.
     ///
     /// # Errors
@@ -61,7 +62,7 @@ impl Judge {
         for pair in replicates {
             let mut row = Vec::with_capacity(6);
             for image in [&pair.with, &pair.without] {
-                for region in COLUMNS {
+                for region in Self::REGIONS {
                     row.push(regions.mean(region, image)?);
                 }
             }
@@ -95,7 +96,7 @@ impl Judge {
 
     /// Q of a region: the ratio of its mean irradiances.
     pub fn q_of(&self, region: Region) -> Option<Estimate> {
-        COLUMNS.iter().position(|&r| r == region).map(|i| self.region(i))
+        Self::REGIONS.iter().position(|&r| r == region).map(|i| self.region(i))
     }
 
     /// The widest 95 % interval among the regions' irradiances and ratios, as

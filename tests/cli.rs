@@ -1,0 +1,440 @@
+//! What a user meets: exit codes, messages, files.
+
+#![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
+
+use serde_json::Value;
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output},
+    time::{Duration, Instant},
+};
+use tempfile::TempDir;
+
+fn aogauge(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_aogauge")).args(args).output().unwrap()
+}
+
+/// Runs, checks the exit code and returns standard error.
+fn expect(code: i32, args: &[&str]) -> String {
+    let output = aogauge(args);
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(code), "aogauge {args:?}\n{stderr}");
+    stderr
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// A scene of the arcade with room for a change.
+fn scene(change: impl Fn(String) -> String) -> String {
+    change(
+        r#"description = "test"
+
+[ao]
+radius = 0.25
+
+[environment]
+radiance = 1.0
+
+[measure]
+center = [0, 0, 0]
+normal = [0, 1, 0]
+transect = [1, 0, 0]
+clearance = 0.08
+resolution = [64, 32]
+
+[look]
+eye = [0.75, 0.42, 1.15]
+target = [0, 0.08, 0]
+resolution = [32, 16]
+
+[[object]]
+name = "ground"
+shape = { plane = { center = [0, 0, 0], u = [0, 0, 6], v = [6, 0, 0] } }
+
+[[object]]
+name = "curtain"
+occluder = true
+shape = { curtain = { thickness = 0.02, gap = 0.10, height = 1.0, length = 6.0 } }
+"#
+        .to_owned(),
+    )
+}
+
+/// A suite of that scene that runs in a moment, with gates.
+fn suite(gates: &str) -> String {
+    format!(
+        r#"description = "test"
+scenes = ["scene.toml"]
+rays = [4]
+replicates = 4
+converged_rays = 32
+golden_rays = 4
+look_rays = 1
+judge = {{ precision = 0.1, paths = 4, replicates = 4, max_replicates = 8 }}
+[[estimator]]
+name = "classic"
+kind = "classic"
+[[estimator]]
+name = "extended"
+kind = "extended"
+receiver_plane = "clipped"
+{gates}
+"#
+    )
+}
+
+/// A folder with `suite.toml` and `scene.toml`.
+fn folder(scene: &str, suite: &str) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    let path = folder.path().join("suite.toml");
+    fs::write(&path, suite).unwrap();
+    (folder, path)
+}
+
+fn run(suite: &Path, out: &Path, code: i32, more: &[&str]) -> String {
+    expect(code, &[&["run", text(suite), "--out", text(out), "--renderer", "cpu"], more].concat())
+}
+
+fn record(out: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(out.join("record.json")).unwrap()).unwrap()
+}
+
+/// Every file below a folder with its bytes.
+fn files(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![root.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                found.insert(path.strip_prefix(root).unwrap().to_owned(), fs::read(&path).unwrap());
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn a_run_leaves_a_record_and_a_report() {
+    let (dir, suite) = folder(&scene(|s| s), &suite(""));
+    let out = dir.path().join("out");
+    let stderr = run(&suite, &out, 0, &[]);
+    assert!(stderr.contains("report.md"), "{stderr}");
+    assert!(!stderr.contains('\u{1b}') && !stderr.contains("XDG_RUNTIME_DIR"), "no noise off a terminal: {stderr}");
+    let report = fs::read_to_string(out.join("report.md")).unwrap();
+    for picture in report.split("](").skip(1).map(|s| s.split(')').next().unwrap()) {
+        assert!(out.join(picture).exists(), "{picture}");
+    }
+    let record = record(&out);
+    assert_eq!(record["cases"].as_array().unwrap().len(), 2);
+    for image in files(&out).keys().filter(|p| p.extension().is_some_and(|e| e == "exr")) {
+        aogauge::layers::Layers::read(&out.join(image)).unwrap();
+    }
+}
+
+#[test]
+fn the_record_satisfies_its_schema() {
+    let (dir, suite) = folder(&scene(|s| s), &suite(""));
+    let out = dir.path().join("out");
+    run(&suite, &out, 0, &[]);
+    let schema: Value = serde_json::from_slice(&aogauge(&["schema", "record"]).stdout).unwrap();
+    let validator = jsonschema::validator_for(&schema).unwrap();
+    let mut record = record(&out);
+    let errors: Vec<String> = validator.iter_errors(&record).map(|e| e.to_string()).collect();
+    assert!(errors.is_empty(), "{errors:?}");
+    record["seed"] = "one".into();
+    assert!(!validator.is_valid(&record));
+}
+
+#[test]
+fn broken_scenes_are_named_by_file_and_line() {
+    type Change = fn(String) -> String;
+    let cases: [(&str, Change, &[&str]); 8] = [
+        ("no light", |s| s.replace("radiance = 1.0", "radiance = 0"), &["scene.toml", "line 7", "above 0"]),
+        (
+            "unknown key",
+            |s| s.replace("radius = 0.25", "radius = 0.25\ncolour = 3"),
+            &["scene.toml", "line 5", "colour"],
+        ),
+        ("negative radius", |s| s.replace("radius = 0.25", "radius = -0.25"), &["scene.toml", "line 4", "above 0"]),
+        (
+            "NaN vertex",
+            |s| {
+                s.replace(
+                    "plane = { center = [0, 0, 0], u = [0, 0, 6], v = [6, 0, 0] }",
+                    "polygons = { positions = [[0, 0, 0], [1, 0, nan], [1, 0, 1]], triangles = [[0, 1, 2]] }",
+                )
+            },
+            &["scene.toml", "line 23", "finite"],
+        ),
+        (
+            "index out of range",
+            |s| {
+                s.replace(
+                    "plane = { center = [0, 0, 0], u = [0, 0, 6], v = [6, 0, 0] }",
+                    "polygons = { positions = [[0, 0, 0], [1, 0, 0], [1, 0, 1]], triangles = [[0, 1, 3]] }",
+                )
+            },
+            &["scene.toml", "'ground'", "vertex 3"],
+        ),
+        ("no light at all", |s| s.replace("[environment]\nradiance = 1.0\n", ""), &["scene.toml", "environment"]),
+        ("huge resolution", |s| s.replace("[64, 32]", "[640000, 32]"), &["scene.toml", "line 14", "4096"]),
+        ("two of a name", |s| s.replace("\"ground\"", "\"curtain\""), &["scene.toml", "curtain"]),
+    ];
+    for (what, change, says) in cases {
+        let (dir, suite) = folder(&scene(change), &suite(""));
+        let stderr = run(&suite, &dir.path().join("out"), 2, &[]);
+        for word in says {
+            assert!(stderr.contains(word), "{what}: no '{word}' in\n{stderr}");
+        }
+        assert!(!dir.path().join("out").exists(), "{what}: nothing is written");
+    }
+}
+
+#[test]
+fn missing_files_and_unknown_names_are_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out");
+    let missing = dir.path().join("none.toml");
+    assert!(run(&missing, &out, 2, &[]).contains("none.toml"));
+    assert!(expect(2, &["run", "thin-ocluders", "--out", text(&out)]).contains("thin-occluders"));
+    let (with_suite, path) = folder(&scene(|s| s), &suite(""));
+    fs::remove_file(with_suite.path().join("scene.toml")).unwrap();
+    assert!(run(&path, &out, 2, &[]).contains("scene.toml"));
+    expect(2, &["run", "--no-such-flag"]);
+    expect(2, &["report", text(dir.path())]);
+    assert!(!out.exists());
+}
+
+#[test]
+fn an_output_folder_that_cannot_be_written_is_named() {
+    let (dir, suite) = folder(&scene(|s| s), &suite(""));
+    let file = dir.path().join("file");
+    fs::write(&file, "x").unwrap();
+    let stderr = run(&suite, &file.join("out"), 2, &[]);
+    assert!(stderr.contains("file") && stderr.contains("cannot"), "{stderr}");
+    // A folder of somebody's files is not ours to move.
+    let mine = dir.path().join("mine");
+    fs::create_dir(&mine).unwrap();
+    fs::write(mine.join("thesis.tex"), "x").unwrap();
+    assert!(run(&suite, &mine, 2, &[]).contains("not a record"));
+    assert!(mine.join("thesis.tex").exists());
+}
+
+#[test]
+fn an_older_record_is_moved_aside() {
+    let (dir, suite) = folder(&scene(|s| s), &suite(""));
+    let out = dir.path().join("out");
+    for seed in ["1", "2", "3"] {
+        run(&suite, &out, 0, &["--seed", seed]);
+    }
+    assert_eq!(record(&out)["seed"], 3);
+    assert_eq!(record(&dir.path().join("out.previous"))["seed"], 2);
+}
+
+#[test]
+fn a_killed_run_leaves_no_record() {
+    let slow = suite("")
+        .replace("converged_rays = 32", "converged_rays = 65536")
+        .replace("look_rays = 1", "look_rays = 65536");
+    let (dir, suite) = folder(&scene(|s| s.replace("[32, 16]", "[1024, 1024]")), &slow);
+    let out = dir.path().join("out");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_aogauge"))
+        .args(["run", text(&suite), "--out", text(&out), "--renderer", "cpu"])
+        .spawn()
+        .unwrap();
+    let start = Instant::now();
+    while !out.join("images").exists() {
+        assert!(start.elapsed() < Duration::from_secs(60), "the run never began");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(!out.join("record.json").exists());
+    for command in [&["report"][..], &["golden", "verify"]] {
+        let stderr = expect(2, &[command, &[text(&out)]].concat());
+        assert!(stderr.contains("did not finish"), "{stderr}");
+    }
+}
+
+#[test]
+fn the_same_suite_and_seed_give_the_same_bytes_at_any_thread_count() {
+    let (dir, suite) = folder(&scene(|s| s), &suite(""));
+    let outs = ["1", "2"].map(|threads| {
+        let out = dir.path().join(threads);
+        run(&suite, &out, 0, &["--threads", threads]);
+        out
+    });
+    let [mut a, mut b] = outs.clone().map(|o| files(&o));
+    let json = Path::new("record.json");
+    let [mut ra, mut rb] = outs.map(|o| record(&o));
+    assert_ne!(ra["timing"]["threads"], rb["timing"]["threads"]);
+    for r in [&mut ra, &mut rb] {
+        r.as_object_mut().unwrap().remove("timing");
+    }
+    assert_eq!(serde_json::to_string(&ra).unwrap(), serde_json::to_string(&rb).unwrap());
+    for f in [&mut a, &mut b] {
+        f.remove(json);
+        f.remove(Path::new("report.md")); // it shows the times
+    }
+    assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
+    for (name, bytes) in &a {
+        assert!(bytes == &b[name], "{} differs", name.display());
+    }
+}
+
+#[test]
+fn exit_codes_follow_the_verdicts() {
+    let gate = |limit: &str| {
+        format!("[[gate]]\nname = \"g\"\nmetric = \"openness\"\nregion = \"all\"\nestimators = [\"classic\"]\n{limit}")
+    };
+    for (limit, code, says) in [
+        ("min = 0.5", 0, "PASS"),
+        ("min = 0.99", 1, "FAIL"),
+        ("equals = 0.5\nwithin = 0.1", 1, "FAIL"),
+        ("min = 0.99\nknown_failure = \"it is dark\"", 0, "KNOWN FAILURE"),
+        ("min = 0.5\nknown_failure = \"it is dark\"", 1, "remove the mark"),
+    ] {
+        let (dir, suite) = folder(&scene(|s| s), &suite(&gate(limit)));
+        let stderr = run(&suite, &dir.path().join("out"), code, &[]);
+        assert!(stderr.contains(says), "{limit}: {stderr}");
+    }
+    // Too few pixels under the sheet: nothing can be said.
+    let narrow = scene(|s| {
+        s.replace("resolution = [64, 32]", "resolution = [64, 16]").replace("thickness = 0.02", "thickness = 0.001")
+    });
+    let (dir, suite) = folder(&narrow, &suite(&gate("min = 0.5").replace("\"all\"", "\"footprint\"")));
+    let stderr = run(&suite, &dir.path().join("out"), 6, &[]);
+    assert!(stderr.contains("INCONCLUSIVE") && stderr.contains("fewer than 64"), "{stderr}");
+}
+
+#[test]
+fn a_report_can_be_made_again() {
+    let (dir, suite) = folder(&scene(|s| s), &suite(""));
+    let (out, again) = (dir.path().join("out"), dir.path().join("again"));
+    run(&suite, &out, 0, &[]);
+    expect(0, &["report", text(&out), "--out", text(&again)]);
+    for (name, bytes) in files(&again) {
+        assert!(bytes == fs::read(out.join(&name)).unwrap(), "{}", name.display());
+    }
+    assert!(again.join("report.md").exists());
+}
+
+#[test]
+fn a_record_of_another_version_is_refused() {
+    let (dir, suite) = folder(&scene(|s| s), &suite(""));
+    let out = dir.path().join("out");
+    run(&suite, &out, 0, &[]);
+    let path = out.join("record.json");
+    let newer = fs::read_to_string(&path).unwrap().replacen("\"version\": 1", "\"version\": 99", 1);
+    fs::write(&path, newer).unwrap();
+    assert!(expect(2, &["report", text(&out)]).contains("version 99"));
+    fs::write(&path, "{").unwrap();
+    assert!(expect(2, &["report", text(&out)]).contains("record.json"));
+}
+
+#[test]
+fn goldens_are_approved_and_verified() {
+    let (dir, suite) = folder(&scene(|s| s), &suite(""));
+    let (out, goldens) = (dir.path().join("out"), dir.path().join("goldens"));
+    let verify = |code: i32, out: &Path| expect(code, &["golden", "verify", text(out), "--goldens", text(&goldens)]);
+    run(&suite, &out, 0, &[]);
+
+    assert!(verify(3, &out).contains("MISSING"));
+    assert!(!goldens.exists(), "a missing golden is never created");
+    expect(2, &["golden", "approve", text(&out), "--goldens", text(&goldens)]);
+    expect(2, &["golden", "approve", text(&out), "--goldens", text(&goldens), "--reason", " "]);
+    expect(4, &["golden", "approve", text(&out), "--goldens", text(&goldens), "--reason", "r", "--only", "nothing"]);
+    expect(0, &["golden", "approve", text(&out), "--goldens", text(&goldens), "--reason", "first"]);
+    assert!(verify(0, &out).contains("identical"));
+
+    let fresh = dir.path().join("fresh");
+    run(&suite, &fresh, 0, &["--seed", "77"]);
+    let stderr = verify(0, &fresh);
+    assert!(stderr.contains("fresh seeds") && stderr.contains("would see a bias"), "{stderr}");
+
+    let golden = goldens.join("scene/classic.4.exr");
+    let mut layers = aogauge::layers::Layers::read(&golden).unwrap();
+    assert_eq!(layers.attributes["reason"], "first");
+    assert_eq!(layers.attributes["rays"], "4");
+    let whole = fs::read(&golden).unwrap();
+    for v in layers.layers.get_mut("mean").unwrap() {
+        *v -= 0.1;
+    }
+    layers.write(&golden).unwrap();
+    let stderr = verify(1, &fresh);
+    assert!(stderr.contains("DIFFERENT") && stderr.contains("9 of 9 tests reject"), "{stderr}");
+    fs::write(&golden, &whole[..whole.len() / 2]).unwrap();
+    assert!(verify(3, &out).contains("UNUSABLE"));
+    fs::write(&golden, &whole).unwrap();
+
+    fs::write(dir.path().join("scene.toml"), scene(|s| s.replace("gap = 0.10", "gap = 0.12"))).unwrap();
+    let moved = dir.path().join("moved");
+    run(&suite, &moved, 0, &[]);
+    assert!(verify(3, &moved).contains("another version of the scene"));
+}
+
+#[test]
+fn programs_can_read_the_results() {
+    let (dir, suite) = folder(&scene(|s| s), &suite(""));
+    let out = dir.path().join("out");
+    let run = aogauge(&["run", text(&suite), "--out", text(&out), "--renderer", "cpu", "--format", "json"]);
+    let printed: Value = serde_json::from_slice(&run.stdout).unwrap();
+    assert_eq!(printed, record(&out));
+    let list: Value = serde_json::from_slice(&aogauge(&["scene", "list", "--format", "json"]).stdout).unwrap();
+    assert_eq!(list.as_array().unwrap().len(), 7);
+    let doctor: Value = serde_json::from_slice(&aogauge(&["doctor", "--format", "json"]).stdout).unwrap();
+    assert!(doctor["cpu"].is_string());
+}
+
+#[test]
+fn every_verb_shows_an_example() {
+    let verbs: [&[&str]; 8] = [
+        &[],
+        &["run"],
+        &["report"],
+        &["golden", "approve"],
+        &["golden", "verify"],
+        &["scene", "list"],
+        &["doctor"],
+        &["schema"],
+    ];
+    for verb in verbs {
+        let help = aogauge(&[verb, &["--help"]].concat());
+        assert!(String::from_utf8_lossy(&help.stdout).contains("Example"), "{verb:?}");
+    }
+}
+
+/// Without a driver the CPU renders, and the record says why there is no GPU.
+#[test]
+fn no_driver_is_no_error_unless_a_gpu_is_asked_for() {
+    let (dir, suite) = folder(
+        &scene(|s| s),
+        &suite(
+            "[[gate]]\nname = \"same\"\nmetric = \"renderer-difference\"\nrenderers = [\"gpu\"]\nequals = 0.0\nwithin = 0.1",
+        ),
+    );
+    let out = dir.path().join("out");
+    let blind = |args: &[&str]| {
+        Command::new(env!("CARGO_BIN_EXE_aogauge"))
+            .args(args)
+            .env("VK_DRIVER_FILES", "/nonexistent.json")
+            .env("VK_ICD_FILENAMES", "/nonexistent.json")
+            .output()
+            .unwrap()
+    };
+    let run = blind(&["run", text(&suite), "--out", text(&out)]);
+    assert_eq!(run.status.code(), Some(0));
+    assert!(String::from_utf8_lossy(&run.stderr).contains("NOT RUN"));
+    assert!(record(&out)["machine"]["gpu"].as_str().unwrap().contains("mesa-vulkan-drivers"));
+    let asked = blind(&["run", text(&suite), "--out", text(&out), "--renderer", "gpu"]);
+    assert_eq!(asked.status.code(), Some(2));
+    assert_eq!(record(&out)["seed"], 1, "the older record stays");
+}
