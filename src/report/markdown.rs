@@ -1,6 +1,6 @@
 //! The Markdown report.
 
-use super::table::{self, Row, outcome_text, subject, value_text};
+use super::table::{self, Row, outcome_text, plus_minus, subject, value_text};
 use crate::{
     gate::{CONFIDENCE, Outcome},
     metrics::{Metric, MetricName, artifact::Brighter, regions::Region},
@@ -70,7 +70,7 @@ fn show(metric: Option<&Metric>) -> String {
     match metric {
         None => "–".to_owned(),
         Some(m) => match m.estimate() {
-            Some(e) if m.value.is_some() => value_text(m.value, Some(e.interval(CONFIDENCE))),
+            Some(e) => plus_minus(e.value, e.interval(CONFIDENCE)),
             _ => format!("none: {}", m.note.as_deref().unwrap_or("no interval")),
         },
     }
@@ -114,7 +114,7 @@ fn judge_text(scene: &SceneRecord) -> Option<String> {
     let q: Vec<String> = judge
         .q
         .iter()
-        .map(|(region, [value, lo, hi])| format!("{} {}", region.label(), value_text(Some(*value), Some([*lo, *hi]))))
+        .map(|(region, [value, lo, hi])| format!("{} {}", region.label(), plus_minus(*value, [*lo, *hi])))
         .collect();
     let reached = if judge.precision <= judge.wanted { "" } else { ", **less precise than asked**" };
     Some(format!(

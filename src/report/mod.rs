@@ -82,7 +82,8 @@ fn pictures(folder: &Path, record: &Record, scene: &SceneRecord, out: &Path) -> 
     let converged = read(&scene.image)?;
     for name in &record.suite.estimators {
         let values = layer(&converged, &scene.image, &format!("converged-{name}"))?;
-        picture::openness(&values, converged.resolution, 4, &out.join(format!("{name}.png")))?;
+        let (values, size) = middle(scene, &values);
+        picture::openness(&values, size, 4, &out.join(format!("{name}.png")))?;
     }
     if let Some(judge) = &scene.judge {
         let layers = read(&judge.image)?;
@@ -93,9 +94,19 @@ fn pictures(folder: &Path, record: &Record, scene: &SceneRecord, out: &Path) -> 
                 *q = f32::NAN;
             }
         }
-        picture::openness(&q, layers.resolution, 4, &out.join("q.png"))?;
+        let (q, size) = middle(scene, &q);
+        picture::openness(&q, size, 4, &out.join("q.png"))?;
     }
     let svg = plot::profile(scene).map_err(|message| ReportError::Plot { scene: scene.name.clone(), message })?;
     write_whole(&out.join("profile.svg"), |buffer| buffer.write_all(svg.as_bytes()))?;
     Ok(())
+}
+
+/// The columns of a measure image within R of its centre, so that pictures are
+/// small enough to stand side by side; profiles show the rest.
+fn middle(scene: &SceneRecord, values: &[f32]) -> (Vec<f32>, [u32; 2]) {
+    let columns: Vec<usize> = (0..scene.transect.len()).filter(|&x| scene.transect[x].abs() <= 1.04).collect();
+    let rows = values.chunks_exact(scene.transect.len().max(1));
+    let height = rows.len() as u32;
+    (rows.flat_map(|row| columns.iter().map(|&x| row[x])).collect(), [columns.len() as u32, height])
 }

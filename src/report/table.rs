@@ -36,6 +36,11 @@ pub fn outcome_text(outcome: Outcome) -> &'static str {
     }
 }
 
+/// The digits after the point that an interval of this half width earns.
+fn digits(half: f64) -> usize {
+    if half > 0.0 { (1.0 - half.log10().floor()).clamp(2.0, 6.0) as usize } else { 4 }
+}
+
 /// `value [lo, hi]` with the digits that the interval earns.
 pub fn value_text(value: Option<f64>, interval: Option<[f64; 2]>) -> String {
     let Some(value) = value else {
@@ -44,9 +49,15 @@ pub fn value_text(value: Option<f64>, interval: Option<[f64; 2]>) -> String {
     let Some([lo, hi]) = interval else {
         return format!("{value:.4}");
     };
+    let d = digits((hi - lo) / 2.0);
+    format!("{value:.d$} [{lo:.d$}, {hi:.d$}]")
+}
+
+/// `value ± half width` with the digits that the interval earns.
+pub fn plus_minus(value: f64, [lo, hi]: [f64; 2]) -> String {
     let half = (hi - lo) / 2.0;
-    let digits = if half > 0.0 { (1.0 - half.log10().floor()).clamp(2.0, 6.0) as usize } else { 4 };
-    format!("{value:+.digits$} [{lo:+.digits$}, {hi:+.digits$}]")
+    let d = digits(half);
+    format!("{value:.d$} ± {half:.d$}")
 }
 
 /// The case of a verdict, or `scene (judge)`.
@@ -118,9 +129,10 @@ mod tests {
 
     #[test]
     fn values_show_the_digits_their_interval_earns() {
-        assert_eq!(value_text(Some(0.123_456), Some([0.12, 0.13])), "+0.1235 [+0.1200, +0.1300]");
-        assert_eq!(value_text(Some(1.0), Some([0.5, 1.5])), "+1.00 [+0.50, +1.50]");
-        assert_eq!(value_text(Some(1.0), Some([1.0, 1.0])), "+1.0000 [+1.0000, +1.0000]");
+        assert_eq!(value_text(Some(0.123_456), Some([0.12, 0.13])), "0.1235 [0.1200, 0.1300]");
+        assert_eq!(value_text(Some(-1.0), Some([-1.5, -0.5])), "-1.00 [-1.50, -0.50]");
+        assert_eq!(value_text(Some(1.0), Some([1.0, 1.0])), "1.0000 [1.0000, 1.0000]");
+        assert_eq!(plus_minus(0.123_456, [0.118_456, 0.128_456]), "0.1235 ± 0.0050");
         assert_eq!(value_text(None, None), "none");
     }
 }
