@@ -43,6 +43,14 @@ pub enum RunError {
         /// Why.
         source: RenderError,
     },
+    /// The measure view of a scene looks at the occluder.
+    #[error("scene '{scene}': the measure view sees the occluder '{object}'; measure.clearance must end under it")]
+    SeesOccluder {
+        /// The scene.
+        scene: String,
+        /// The object it sees.
+        object: String,
+    },
     /// The measure view of a scene sees nothing.
     #[error(
         "scene '{scene}': the measure view sees no surface; check measure.center, measure.normal and measure.clearance"
@@ -205,6 +213,11 @@ impl<'a> Set<'a> {
         let geometry = Geometry::new(scene).map_err(render_error(scene))?;
         let view = scene.measure.view();
         let gbuffer = GBuffer::new(&geometry.tracer, &view);
+        let owner: Vec<usize> = scene.triangles().map(|(object, _)| object).collect();
+        let seen = gbuffer.surfaces.iter().flatten().map(|s| &scene.objects[owner[s.triangle as usize]]);
+        if let Some(object) = seen.into_iter().find(|o| o.occluder) {
+            return Err(RunError::SeesOccluder { scene: scene.name.clone(), object: object.name.clone() });
+        }
         let regions = Regions::new(scene, &geometry.tracer, &gbuffer);
         if regions.pixels(Region::All).is_empty() {
             return Err(RunError::SeesNothing { scene: scene.name.clone() });

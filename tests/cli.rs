@@ -156,7 +156,7 @@ fn the_record_satisfies_its_schema() {
 #[test]
 fn broken_scenes_are_named_by_file_and_line() {
     type Change = fn(String) -> String;
-    let cases: [(&str, Change, &[&str]); 8] = [
+    let cases: [(&str, Change, &[&str]); 10] = [
         ("no light", |s| s.replace("radiance = 1.0", "radiance = 0"), &["scene.toml", "line 7", "above 0"]),
         (
             "unknown key",
@@ -186,6 +186,16 @@ fn broken_scenes_are_named_by_file_and_line() {
         ),
         ("no light at all", |s| s.replace("[environment]\nradiance = 1.0\n", ""), &["scene.toml", "environment"]),
         ("huge resolution", |s| s.replace("[64, 32]", "[640000, 32]"), &["scene.toml", "line 14", "4096"]),
+        (
+            "view over the hem",
+            |s| s.replace("clearance = 0.08", "clearance = 0.2"),
+            &["'curtain'", "measure.clearance"],
+        ),
+        (
+            "view into the air",
+            |s| s.replace("center = [0, 0, 0]\nnormal", "center = [900, 0, 0]\nnormal"),
+            &["no surface", "measure.center"],
+        ),
         ("two of a name", |s| s.replace("\"ground\"", "\"curtain\""), &["scene.toml", "curtain"]),
     ];
     for (what, change, says) in cases {
@@ -194,7 +204,7 @@ fn broken_scenes_are_named_by_file_and_line() {
         for word in says {
             assert!(stderr.contains(word), "{what}: no '{word}' in\n{stderr}");
         }
-        assert!(!dir.path().join("out").exists(), "{what}: nothing is written");
+        assert!(!dir.path().join("out/record.json").exists(), "{what}: no record is written");
     }
 }
 

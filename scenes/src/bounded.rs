@@ -84,3 +84,18 @@ impl<'de> Deserialize<'de> for Triple {
         <[Finite; 3]>::deserialize(d).map(|v| Self(v.map(|c| c.0)))
     }
 }
+
+/// A name that is safe as a file name on every system: letters, digits, `-`, `_`
+/// and `.`, not beginning with a dot, at most 64 characters.
+///
+/// # Errors
+/// One sentence that says what a name may hold.
+pub fn check_name(name: &str) -> Result<(), String> {
+    let legal = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    if name.is_empty() || name.len() > 64 || name.starts_with('.') || !name.chars().all(legal) {
+        return Err(format!(
+            "'{name}' is not a legal name: use 1 to 64 letters, digits, '-', '_' and '.', not beginning with '.'"
+        ));
+    }
+    Ok(())
+}

@@ -2,7 +2,7 @@
 
 use crate::{
     AoScale, Object, Scene,
-    bounded::{Albedo, Positive},
+    bounded::{Albedo, Positive, check_name},
     environment::EnvironmentFile,
     generators::Shape,
     view::{LookFile, MeasureFile},
@@ -96,6 +96,7 @@ struct ObjectFile {
 
 impl SceneFile {
     fn build(self, name: &str) -> Result<Scene, String> {
+        check_name(name).map_err(|e| format!("the scene's name, its file's without the ending: {e}"))?;
         let mut objects = Vec::with_capacity(self.objects.len());
         for o in self.objects {
             if objects.iter().any(|b: &Object| b.name == o.name) {

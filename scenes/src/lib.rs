@@ -18,6 +18,7 @@ mod mesh;
 mod scene;
 mod view;
 
+pub use bounded::check_name;
 pub use environment::{Environment, Portal};
 pub use file::SceneError;
 pub use mesh::Mesh;

@@ -94,6 +94,8 @@ fn look_rays() -> Rays {
 #[serde(deny_unknown_fields, default)]
 pub struct JudgeSettings {
     /// Half width of the 95 % interval of each region mean, relative.
+    #[serde(deserialize_with = "precision")]
+    #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 1))]
     pub precision: f64,
     /// Paths a pixel in one replicate.
     pub paths: Rays,
@@ -106,6 +108,15 @@ pub struct JudgeSettings {
 impl Default for JudgeSettings {
     fn default() -> Self {
         JudgeSettings { precision: 0.02, paths: Rays(16), replicates: Replicates(16), max_replicates: Replicates(128) }
+    }
+}
+
+fn precision<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
+    let value = f64::deserialize(d)?;
+    if value > 0.0 && value <= 1.0 {
+        Ok(value)
+    } else {
+        Err(D::Error::custom(format!("{value} is out of range: it must be above 0 and at most 1")))
     }
 }
 

@@ -122,6 +122,20 @@ impl Suite {
             }
             scenes.push(scene);
         }
+        for (list, empty) in [("scenes", scenes.is_empty()), ("rays", parsed.rays.is_empty())] {
+            if empty {
+                return Err(invalid(format!("{list} is empty: name at least one")));
+            }
+        }
+        if let Some(i) = (1..parsed.rays.len()).find(|&i| parsed.rays[..i].contains(&parsed.rays[i])) {
+            return Err(invalid(format!("rays: {} is given twice", parsed.rays[i].get())));
+        }
+        if let Some(rays) = parsed.golden_rays.filter(|r| !parsed.rays.contains(r)) {
+            return Err(invalid(format!("golden_rays is {}, which is not among rays", rays.get())));
+        }
+        if parsed.judge.max_replicates.get() < parsed.judge.replicates.get() {
+            return Err(invalid("judge.max_replicates must not be below judge.replicates".into()));
+        }
         let methods = methods(&parsed).map_err(invalid)?;
         let mut gates = Vec::with_capacity(parsed.gates.len());
         for gate in &parsed.gates {
@@ -163,6 +177,7 @@ fn methods(file: &SuiteFile) -> Result<Vec<Method>, String> {
         if methods.iter().any(|m| m.name == entry.name) {
             return Err(format!("estimator: '{}' is named twice", entry.name));
         }
+        aogauge_scenes::check_name(&entry.name).map_err(|e| format!("estimator: {e}"))?;
         methods.push(Method { name: entry.name.clone(), estimator: entry.build()? });
     }
     if !methods.iter().any(|m| m.estimator == Estimator::Classic) {
@@ -198,6 +213,10 @@ mod tests {
         for (extra, says) in [
             ("colour = 1", "colour"),
             ("golden_rays = 0", "line 6"),
+            ("golden_rays = 5", "not among rays"),
+            ("judge = { precision = 0 }", "line 6"),
+            ("judge = { replicates = 64, max_replicates = 32 }", "max_replicates"),
+            ("[[estimator]]\nname = '../x'\nkind = 'classic'", "legal name"),
             ("[[gate]]\nname = 'g'\nmetric = 'removed'", "min"),
             ("[[gate]]\nname = 'g'\nmetric = 'removed'\nmin = 0.5\nscenes = ['plan']", "'plan'"),
             ("[[gate]]\nname = 'g'\nmetric = 'bias'\nmax = 0.5", "region"),
