@@ -1,8 +1,8 @@
 //! Scene files: TOML in, [`Scene`] out, and errors that say where.
 
 use crate::{
-    AoScale, Object, Scene,
-    bounded::{Albedo, Positive, check_name},
+    AoScale, Material, Object, Scene,
+    bounded::{Albedo, NonNegative, Positive, check_name},
     environment::EnvironmentFile,
     generators::Shape,
     view::{LookFile, MeasureFile},
@@ -88,10 +88,31 @@ struct ObjectFile {
     /// The occluder under judgement: taken away in the twin.
     #[serde(default)]
     occluder: bool,
-    /// Diffuse albedo; 0.6 unless given.
+    /// Grey diffuse albedo; 0.6 unless given.
     albedo: Option<Albedo>,
+    /// Linear colour in place of `albedo`: red, green and blue.
+    color: Option<[Albedo; 3]>,
+    /// Radiance it sends out: red, green and blue.
+    emission: Option<[NonNegative; 3]>,
     /// What it looks like.
     shape: Shape,
+}
+
+impl ObjectFile {
+    fn material(&self) -> Result<Material, String> {
+        let mut material = match (self.albedo, self.color) {
+            (Some(_), Some(_)) => {
+                return Err(format!("object '{}': give albedo or color, not both", self.name));
+            }
+            (Some(a), None) => Material::grey(a.0),
+            (None, Some(c)) => Material::colored(c.map(|c| c.0)),
+            (None, None) => Material::default(),
+        };
+        if let Some(e) = self.emission {
+            material.emissive = e.map(|e| e.0);
+        }
+        Ok(material)
+    }
 }
 
 impl SceneFile {
@@ -102,9 +123,17 @@ impl SceneFile {
             if objects.iter().any(|b: &Object| b.name == o.name) {
                 return Err(format!("two objects are called '{}'", o.name));
             }
-            let mesh = o.shape.mesh().map_err(|e| format!("object '{}': {e}", o.name))?;
-            mesh.validate().map_err(|e| format!("object '{}': {e}", o.name))?;
-            objects.push(Object { name: o.name, occluder: o.occluder, albedo: o.albedo.map_or(0.6, |a| a.0), mesh });
+            let named = |e: &dyn std::fmt::Display| format!("object '{}': {e}", o.name);
+            let material = o.material()?;
+            for part in o.shape.parts().map_err(|e| named(&e))? {
+                part.mesh.validate().map_err(|e| named(&e))?;
+                objects.push(Object {
+                    name: if part.name.is_empty() { o.name.clone() } else { format!("{}.{}", o.name, part.name) },
+                    occluder: o.occluder || part.occluder,
+                    material: part.material.unwrap_or_else(|| material.clone()),
+                    mesh: part.mesh,
+                });
+            }
         }
         if objects.iter().all(|o| o.occluder) {
             return Err("the scene has no receiver: give at least one object that is not an occluder".into());

@@ -1,6 +1,6 @@
 //! Indexed triangles, and nothing else.
 
-use glam::Vec3;
+use glam::{Mat4, Vec2, Vec3};
 
 /// Indexed triangles in metres; counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -9,6 +9,8 @@ pub struct Mesh {
     pub positions: Vec<Vec3>,
     /// Three indices into `positions` a triangle.
     pub triangles: Vec<[u32; 3]>,
+    /// Texture coordinates a vertex, as many as `positions`, or none.
+    pub uvs: Vec<Vec2>,
 }
 
 /// Why a list of vertices and indices is no mesh.
@@ -35,6 +37,14 @@ pub enum MeshError {
     /// There is nothing to trace.
     #[error("the mesh has no triangles")]
     Empty,
+    /// Some vertices have texture coordinates and some have none.
+    #[error("there are {uvs} texture coordinates for {vertices} vertices: give one a vertex, or none")]
+    Uvs {
+        /// How many texture coordinates there are.
+        uvs: usize,
+        /// How many vertices there are.
+        vertices: usize,
+    },
 }
 
 impl Mesh {
@@ -79,6 +89,44 @@ impl Mesh {
         }
     }
 
+    /// Adds a vertex and returns its index.
+    pub fn push_vertex(&mut self, position: Vec3) -> u32 {
+        self.positions.push(position);
+        (self.positions.len() - 1) as u32
+    }
+
+    /// Adds another mesh; its texture coordinates are dropped unless both have
+    /// them.
+    pub fn append(&mut self, other: &Mesh) {
+        let base = self.positions.len() as u32;
+        let textured = self.uvs.len() == self.positions.len() && other.uvs.len() == other.positions.len();
+        self.positions.extend(&other.positions);
+        self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i + base)));
+        if textured {
+            self.uvs.extend(&other.uvs);
+        } else {
+            self.uvs.clear();
+        }
+    }
+
+    /// The mesh moved by an affine map; mirrored maps keep normals outward.
+    #[must_use]
+    pub fn transformed(&self, map: Mat4) -> Mesh {
+        let flip = map.determinant() < 0.0;
+        Mesh {
+            positions: self.positions.iter().map(|p| map.transform_point3(*p)).collect(),
+            triangles: self.triangles.iter().map(|&[a, b, c]| if flip { [a, c, b] } else { [a, b, c] }).collect(),
+            uvs: self.uvs.clone(),
+        }
+    }
+
+    /// Smallest and largest corner; None of an empty mesh.
+    pub fn bounds(&self) -> Option<[Vec3; 2]> {
+        let lo = self.positions.iter().copied().reduce(Vec3::min)?;
+        let hi = self.positions.iter().copied().reduce(Vec3::max)?;
+        Some([lo, hi])
+    }
+
     /// The corner positions of every triangle, in order.
     pub fn corners(&self) -> impl Iterator<Item = [Vec3; 3]> + '_ {
         self.triangles.iter().map(|t| t.map(|i| self.positions[i as usize]))
@@ -100,6 +148,9 @@ impl Mesh {
         }
         if self.triangles.is_empty() {
             return Err(MeshError::Empty);
+        }
+        if !self.uvs.is_empty() && self.uvs.len() != vertices {
+            return Err(MeshError::Uvs { uvs: self.uvs.len(), vertices });
         }
         Ok(())
     }
@@ -133,8 +184,11 @@ mod tests {
 
     #[test]
     fn bad_meshes_are_named() {
-        let mut mesh =
-            Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(0.0, f32::NAN, 0.0)], triangles: vec![[0, 1, 2]] };
+        let mut mesh = Mesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(0.0, f32::NAN, 0.0)],
+            triangles: vec![[0, 1, 2]],
+            uvs: vec![],
+        };
         assert!(mesh.validate().unwrap_err().to_string().contains("vertex 2"));
         mesh.positions[2] = Vec3::Y;
         assert_eq!(mesh.validate(), Ok(()));

@@ -1,6 +1,6 @@
 //! A scene: objects, light, scale and views.
 
-use crate::{Environment, LookView, MeasureView, Mesh};
+use crate::{Environment, LookView, Material, MeasureView, Mesh};
 use glam::Vec3;
 use sha2::{Digest, Sha256};
 
@@ -20,8 +20,8 @@ pub struct Object {
     pub name: String,
     /// Whether this is (part of) the occluder under judgement.
     pub occluder: bool,
-    /// Diffuse albedo, 0 up to but not including 1.
-    pub albedo: f32,
+    /// What it is made of.
+    pub material: Material,
     /// The triangles.
     pub mesh: Mesh,
 }
@@ -88,7 +88,10 @@ impl Scene {
         }
         floats(&[m.clearance, m.pixel]);
         for o in &self.objects {
-            floats(&[o.albedo, f32::from(u8::from(o.occluder))]);
+            floats(&[o.material.albedo(), f32::from(u8::from(o.occluder))]);
+            if o.material.emissive != [0.0; 3] {
+                floats(&o.material.emissive);
+            }
             for corners in o.mesh.corners() {
                 for v in corners {
                     floats(&v.to_array());

@@ -94,7 +94,7 @@ impl Geometry {
     /// See [`Tracer::new`].
     pub fn new(scene: &Scene) -> Result<Self, RenderError> {
         let (albedo, triangles): (Vec<f32>, Vec<_>) =
-            scene.triangles().map(|(object, corners)| (scene.objects[object].albedo, corners)).unzip();
+            scene.triangles().map(|(object, corners)| (scene.objects[object].material.albedo(), corners)).unzip();
         Ok(Geometry { tracer: Tracer::new(&triangles)?, albedo, environment: scene.environment.clone() })
     }
 }

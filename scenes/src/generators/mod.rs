@@ -16,7 +16,7 @@ pub use plane::Plane;
 pub use polygons::Polygons;
 pub use room::{Room, Window};
 
-use crate::Mesh;
+use crate::{Material, Mesh};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -38,19 +38,38 @@ pub enum Shape {
     Polygons(Polygons),
 }
 
+/// A piece of a shape. Most shapes have one; an atrium has many.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Part {
+    /// Told apart within its shape; empty where there is only one.
+    pub name: String,
+    /// Whether the shape itself knows it for a thin occluder.
+    pub occluder: bool,
+    /// Its own material; the object's where there is none.
+    pub material: Option<Material>,
+    /// The triangles.
+    pub mesh: Mesh,
+}
+
+impl From<Mesh> for Vec<Part> {
+    fn from(mesh: Mesh) -> Self {
+        vec![Part { mesh, ..Part::default() }]
+    }
+}
+
 impl Shape {
     /// Makes the triangles.
     ///
     /// # Errors
     /// A sentence that names the parameters that do not go together.
-    pub fn mesh(&self) -> Result<Mesh, String> {
-        match self {
-            Shape::Plane(s) => s.mesh(),
-            Shape::Block(s) => s.mesh(),
-            Shape::Curtain(s) => Ok(s.mesh()),
-            Shape::Arcade(s) => Ok(s.mesh()),
-            Shape::Room(s) => s.mesh(),
-            Shape::Polygons(s) => Ok(s.mesh()),
-        }
+    pub fn parts(&self) -> Result<Vec<Part>, String> {
+        Ok(match self {
+            Shape::Plane(s) => s.mesh()?.into(),
+            Shape::Block(s) => s.mesh()?.into(),
+            Shape::Curtain(s) => s.mesh().into(),
+            Shape::Arcade(s) => s.mesh().into(),
+            Shape::Room(s) => s.mesh()?.into(),
+            Shape::Polygons(s) => s.mesh().into(),
+        })
     }
 }

@@ -16,6 +16,10 @@ pub struct Polygons {
 
 impl Polygons {
     pub(crate) fn mesh(&self) -> Mesh {
-        Mesh { positions: self.positions.iter().map(|p| p.vec()).collect(), triangles: self.triangles.clone() }
+        Mesh {
+            positions: self.positions.iter().map(|p| p.vec()).collect(),
+            triangles: self.triangles.clone(),
+            uvs: vec![],
+        }
     }
 }
