@@ -218,7 +218,7 @@ impl<'a> Set<'a> {
         if let Some(object) = seen.into_iter().find(|o| o.occluder) {
             return Err(RunError::SeesOccluder { scene: scene.name.clone(), object: object.name.clone() });
         }
-        let regions = Regions::new(scene, &geometry.tracer, &gbuffer);
+        let regions = Regions::new(scene, &geometry.tracer, &gbuffer).map_err(|e| render_error(scene)(e.into()))?;
         if regions.pixels(Region::All).is_empty() {
             return Err(RunError::SeesNothing { scene: scene.name.clone() });
         }

@@ -139,7 +139,7 @@ fn highlight_contrast_agrees_with_the_reference() {
         let geometry = Geometry::new(&scene).unwrap();
         let view = scene.measure.view();
         let gbuffer = GBuffer::new(&geometry.tracer, &view);
-        let regions = Regions::new(&scene, &geometry.tracer, &gbuffer);
+        let regions = Regions::new(&scene, &geometry.tracer, &gbuffer).unwrap();
         for (column, estimator, ratio) in METHODS {
             scene.ao.secondary_radius = ratio * scene.ao.radius;
             let name = column.strip_prefix("ext2_c_").unwrap_or("classic");

@@ -3,6 +3,7 @@
 use crate::{
     AoScale, Material, Object, Scene,
     bounded::{Albedo, NonNegative, Positive, check_name},
+    derive,
     environment::EnvironmentFile,
     generators::Shape,
     view::{LookFile, MeasureFile},
@@ -60,10 +61,12 @@ pub(crate) struct SceneFile {
     ao: AoFile,
     /// The light.
     environment: EnvironmentFile,
-    /// Where metrics are taken.
-    measure: MeasureFile,
-    /// Where pictures are taken.
-    look: LookFile,
+    /// Where metrics are taken; found from the occluder and what it stands over
+    /// unless given.
+    measure: Option<MeasureFile>,
+    /// Where pictures are taken; towards the middle of the measure view unless
+    /// given.
+    look: Option<LookFile>,
     /// The geometry.
     #[serde(rename = "object")]
     objects: Vec<ObjectFile>,
@@ -139,14 +142,22 @@ impl SceneFile {
             return Err("the scene has no receiver: give at least one object that is not an occluder".into());
         }
         let radius = self.ao.radius.0;
+        let measure = match &self.measure {
+            Some(given) => given.build(radius)?,
+            None => derive::measure(&objects, radius)?,
+        };
+        let look = match &self.look {
+            Some(given) => given.build()?,
+            None => derive::look(&measure, radius),
+        };
         Ok(Scene {
             name: name.to_owned(),
             description: self.description,
             control: self.control,
             ao: AoScale { radius, secondary_radius: self.ao.secondary_radius.map_or(radius / 4.0, |r| r.0) },
             environment: self.environment.build()?,
-            measure: self.measure.build(radius)?,
-            look: self.look.build()?,
+            measure,
+            look,
             objects,
         })
     }

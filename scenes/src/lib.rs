@@ -10,6 +10,7 @@
 //! -Z forward, as in glTF.
 
 mod bounded;
+mod derive;
 mod environment;
 mod file;
 pub mod generators;

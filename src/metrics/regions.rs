@@ -2,7 +2,10 @@
 //! geometry alone.
 
 use super::Absent;
-use crate::{render::gbuffer::GBuffer, render::gbuffer::Surface, trace::Tracer};
+use crate::{
+    render::gbuffer::{GBuffer, Surface},
+    trace::{TraceError, Tracer},
+};
 use aogauge_scenes::Scene;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -62,22 +65,31 @@ pub struct Regions {
 
 impl Regions {
     /// Finds the regions of what the scene's measure view sees.
-    pub fn new(scene: &Scene, tracer: &Tracer, gbuffer: &GBuffer) -> Self {
-        let occluder: Vec<[Vec3; 3]> =
-            scene.triangles().filter(|(o, _)| scene.objects[*o].occluder).map(|(_, t)| t).collect();
-        let transect = scene.measure.transect;
-        let radius = scene.ao.radius;
+    ///
+    /// # Errors
+    /// [`TraceError`](crate::trace::TraceError) where the occluder or the rest of
+    /// the scene makes too deep a tree.
+    pub fn new(scene: &Scene, tracer: &Tracer, gbuffer: &GBuffer) -> Result<Self, TraceError> {
+        let part = |occluder: bool| {
+            let triangles: Vec<[Vec3; 3]> =
+                scene.triangles().filter(|(o, _)| scene.objects[*o].occluder == occluder).map(|(_, t)| t).collect();
+            Tracer::new(&triangles)
+        };
+        let finder = Finder {
+            sheet: part(true)?,
+            receiver: part(false)?,
+            scene: tracer,
+            transect: scene.measure.transect,
+            radius: scene.ao.radius,
+        };
         let found: Vec<[bool; 5]> = gbuffer
             .surfaces
             .par_iter()
-            .map(|surface| match surface {
-                None => [false; 5],
-                Some(s) => classify(s, &occluder, transect, radius, tracer),
-            })
+            .map(|surface| surface.as_ref().map_or([false; 5], |s| finder.classify(s)))
             .collect();
         let pixels =
             std::array::from_fn(|region| (0..found.len() as u32).filter(|&i| found[i as usize][region]).collect());
-        Regions { pixels }
+        Ok(Regions { pixels })
     }
 
     /// The pixels of a region, in order.
@@ -120,54 +132,121 @@ impl Regions {
     }
 }
 
-/// Membership of one receiver point in each region.
-fn classify(s: &Surface, occluder: &[[Vec3; 3]], transect: Vec3, radius: f32, tracer: &Tracer) -> [bool; 5] {
-    // Axes of the tangent plane: along the transect and across it.
-    let x = (transect - s.normal * s.normal.dot(transect)).normalize_or_zero();
-    let y = s.normal.cross(x);
-    let nearest = occluder
-        .iter()
-        .filter_map(|t| nearest_shadow(s, t, radius, x, y))
-        .min_by(|a, b| a.length().total_cmp(&b.length()));
-    let mut member = [false; 5];
-    member[Region::All as usize] = true;
-    if let Some(to) = nearest {
-        let distance = to.length() / radius;
-        member[Region::Footprint as usize] = distance <= FOOTPRINT_MARGIN + ROUNDING;
-        if (FLANK[0] - ROUNDING..=FLANK[1] + ROUNDING).contains(&distance) {
-            let side = if to.x > 0.0 { Region::Left } else { Region::Right };
-            member[side as usize] = true;
-        }
-    }
-    member[Region::Far as usize] = tracer
-        .nearest(s.point, radius, |t| t.iter().any(|v| s.normal.dot(*v - s.point).abs() > OWN_PLANE * radius))
-        .is_none();
-    member
+/// What regions are found with.
+struct Finder<'a> {
+    sheet: Tracer,
+    receiver: Tracer,
+    scene: &'a Tracer,
+    transect: Vec3,
+    radius: f32,
 }
 
-/// The vector, in the tangent plane of `s`, from `s` to the nearest point of the
-/// triangle's shadow: its part between 0 and `radius` above the plane, projected
-/// along the normal. None where it has no such part; zero where it stands over `s`.
-fn nearest_shadow(s: &Surface, triangle: &[Vec3; 3], radius: f32, x: Vec3, y: Vec3) -> Option<Vec2> {
-    let local = triangle.map(|v| {
-        let d = v - s.point;
-        Vec3::new(d.dot(x), d.dot(y), s.normal.dot(d))
-    });
-    let above = clip(&local, |v| v.z);
-    let slab = clip(&above, |v| radius - v.z);
-    let polygon: Vec<Vec2> = slab.iter().map(|v| v.truncate()).collect();
-    let n = polygon.len();
-    if n == 0 {
-        return None;
+impl Finder<'_> {
+    /// Membership of one receiver point in each region.
+    fn classify(&self, s: &Surface) -> [bool; 5] {
+        let mut member = [false; 5];
+        member[Region::All as usize] = true;
+        if let Some(to) = self.to_shadow(s) {
+            let distance = to.length() / self.radius;
+            member[Region::Footprint as usize] = distance <= FOOTPRINT_MARGIN + ROUNDING;
+            if (FLANK[0] - ROUNDING..=FLANK[1] + ROUNDING).contains(&distance) {
+                let side = if to.x > 0.0 { Region::Left } else { Region::Right };
+                member[side as usize] = true;
+            }
+        }
+        let off_plane = |v: &Vec3| s.normal.dot(*v - s.point).abs() > OWN_PLANE * self.radius;
+        let foreign = |t: &[Vec3; 3]| t.iter().any(off_plane);
+        member[Region::Far as usize] = self.scene.nearest(s.point, self.radius, foreign).is_none();
+        member
     }
+
+    /// The vector, measured along the receiver, from `s` to the nearest point of
+    /// the sheet's shadow: zero where the sheet stands over `s`, None where none
+    /// of it is near. x is along the transect.
+    ///
+    /// The shadow is taken in the tangent plane of the receiver under the sheet's
+    /// nearest point, and `s` is unrolled into that plane by its arc length. On a
+    /// flat receiver that changes nothing; on a cylinder it is exact.
+    fn to_shadow(&self, s: &Surface) -> Option<Vec2> {
+        let reach = self.radius * (1.0 + FLANK[1]);
+        let sheet = self.sheet.nearest(s.point, reach, |_| true)?;
+        let base = self.base(s, sheet.point);
+        let x = (self.transect - base.normal * base.normal.dot(self.transect)).normalize_or_zero();
+        let plane = Plane { origin: base.point, x, y: base.normal.cross(x), normal: base.normal };
+        let from = plane.unroll(s);
+        let mut nearest: Option<Vec2> = None;
+        self.sheet.near(s.point, reach, |triangle| {
+            if let Some(to) = plane.nearest_shadow(from, triangle, self.radius)
+                && nearest.is_none_or(|n| to.length_squared() < n.length_squared())
+            {
+                nearest = Some(to);
+            }
+        });
+        nearest
+    }
+
+    /// The receiver under a point of the sheet; `s` itself where the receiver
+    /// there looks another way (round a corner arc length means nothing).
+    fn base(&self, s: &Surface, sheet: Vec3) -> Surface {
+        let Some(at) = self.receiver.nearest(sheet, self.radius, |_| true) else {
+            return *s;
+        };
+        let [a, b, c] = self.receiver.triangles()[at.triangle as usize];
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let normal = if normal.dot(sheet - at.point) < 0.0 { -normal } else { normal };
+        if normal.dot(s.normal) <= 0.0 {
+            return *s;
+        }
+        Surface { point: at.point, normal, triangle: at.triangle }
+    }
+}
+
+/// A tangent plane of the receiver.
+struct Plane {
+    origin: Vec3,
+    x: Vec3,
+    y: Vec3,
+    normal: Vec3,
+}
+
+impl Plane {
+    /// A point of the receiver laid into the plane at its arc length from the
+    /// origin, taken for that of a circle: chord (a/2) / sin(a/2), a the angle
+    /// between the normals.
+    fn unroll(&self, s: &Surface) -> Vec2 {
+        let d = s.point - self.origin;
+        let flat = Vec2::new(d.dot(self.x), d.dot(self.y));
+        let half = 0.5 * self.normal.cross(s.normal).length().atan2(self.normal.dot(s.normal));
+        if half < 1e-3 {
+            return flat;
+        }
+        flat.normalize_or_zero() * (d.length() * half / half.sin())
+    }
+
+    /// The vector in the plane from `from` to the nearest point of a triangle's
+    /// shadow: its part between 0 and `radius` above the plane, projected along
+    /// the normal. None where it has no such part; zero where it holds `from`.
+    fn nearest_shadow(&self, from: Vec2, triangle: &[Vec3; 3], radius: f32) -> Option<Vec2> {
+        let local = triangle.map(|v| {
+            let d = v - self.origin;
+            Vec3::new(d.dot(self.x) - from.x, d.dot(self.y) - from.y, self.normal.dot(d))
+        });
+        let above = clip(&local, |v| v.z);
+        let slab = clip(&above, |v| radius - v.z);
+        let polygon: Vec<Vec2> = slab.iter().map(|v| v.truncate()).collect();
+        nearest_of_polygon(&polygon)
+    }
+}
+
+/// The point of a convex polygon that is nearest to the origin.
+fn nearest_of_polygon(polygon: &[Vec2]) -> Option<Vec2> {
+    let n = polygon.len();
     let edge = |i: usize| (polygon[i], polygon[(i + 1) % n] - polygon[i]);
-    let turns: Vec<f32> = (0..n)
-        .map(|i| {
-            let (a, e) = edge(i);
-            e.perp_dot(-a)
-        })
-        .collect();
-    if turns.iter().all(|&t| t > 0.0) || turns.iter().all(|&t| t < 0.0) {
+    let side = |i: usize| {
+        let (a, e) = edge(i);
+        e.perp_dot(-a)
+    };
+    if n > 0 && ((0..n).all(|i| side(i) > 0.0) || (0..n).all(|i| side(i) < 0.0)) {
         return Some(Vec2::ZERO);
     }
     (0..n)
@@ -206,7 +285,7 @@ mod tests {
         let scene = library::scene(name).unwrap();
         let geometry = Geometry::new(&scene).unwrap();
         let gbuffer = GBuffer::new(&geometry.tracer, &scene.measure.view());
-        let regions = Regions::new(&scene, &geometry.tracer, &gbuffer);
+        let regions = Regions::new(&scene, &geometry.tracer, &gbuffer).unwrap();
         (scene, gbuffer, regions)
     }
 
@@ -234,6 +313,63 @@ mod tests {
             assert_eq!(regions.pixels(region), expected(region), "{region:?}");
             assert!(regions.measurable(region).is_ok());
         }
+    }
+
+    /// A round pillar of radius 0.3 m and 256 sides, and a radial sheet of no
+    /// thickness 5 cm off it: along the pillar, flanks are bands of arc length.
+    #[test]
+    fn round_a_pillar_flanks_are_bands_of_arc_length() {
+        let (sides, radius) = (256, 0.3f32);
+        let ring = |y: f32| {
+            (0..sides).map(move |i| {
+                let a = std::f32::consts::TAU * (i as f32 + 0.5) / sides as f32;
+                format!("[{}, {y}, {}]", radius * a.sin(), radius * a.cos())
+            })
+        };
+        let positions: Vec<String> = ring(0.0).chain(ring(1.0)).collect();
+        let triangles: Vec<String> = (0..sides)
+            .flat_map(|i| {
+                let j = (i + 1) % sides;
+                [format!("[{i}, {j}, {}]", sides + j), format!("[{i}, {}, {}]", sides + j, sides + i)]
+            })
+            .collect();
+        let text = format!(
+            r#"
+description = "x"
+ao = {{ radius = 0.25 }}
+environment = {{ radiance = 1.0 }}
+measure = {{ center = [0, 0.5, 0.3], normal = [0, 0, 1], transect = [1, 0, 0], clearance = 0.04, resolution = [112, 32] }}
+look = {{ eye = [1, 1, 1], target = [0, 0, 0], resolution = [16, 16] }}
+[[object]]
+name = "pillar"
+shape = {{ polygons = {{ positions = [{}], triangles = [{}] }} }}
+[[object]]
+name = "sheet"
+occluder = true
+shape = {{ polygons = {{ positions = [[0, 0, 0.35], [0, 1, 0.35], [0, 1, 0.9], [0, 0, 0.9]], triangles = [[0, 1, 2], [0, 2, 3]] }} }}
+"#,
+            positions.join(", "),
+            triangles.join(", ")
+        );
+        let scene = Scene::from_toml("x", "x.toml", &text).unwrap();
+        let geometry = Geometry::new(&scene).unwrap();
+        let gbuffer = GBuffer::new(&geometry.tracer, &scene.measure.view());
+        let regions = Regions::new(&scene, &geometry.tracer, &gbuffer).unwrap();
+        let mut checked = 0;
+        for (i, s) in gbuffer.surfaces.iter().enumerate() {
+            let Some(s) = s else { continue };
+            let arc = radius * s.point.x.atan2(s.point.z) / 0.25;
+            // The sides are flat, which moves an edge by up to half a side.
+            if [0.02, 0.15, 0.45].iter().any(|edge| (arc.abs() - edge).abs() < 0.016) {
+                continue;
+            }
+            let is = |region| regions.pixels(region).contains(&(i as u32));
+            assert_eq!(is(Region::Footprint), arc.abs() < 0.02, "{arc}");
+            assert_eq!(is(Region::Right), arc > 0.15 && arc < 0.45, "{arc}");
+            assert_eq!(is(Region::Left), arc < -0.15 && arc > -0.45, "{arc}");
+            checked += 1;
+        }
+        assert!(checked > 2_000 && regions.pixels(Region::Left).len() > 300, "{checked}");
     }
 
     #[test]

@@ -235,32 +235,65 @@ impl Tracer {
         }
     }
 
-    /// Distance from a point to the nearest triangle that `accept` takes (by its
-    /// corners), or None where there is none within `radius`.
-    pub fn nearest(&self, point: Vec3, radius: f32, accept: impl Fn(&[Vec3; 3]) -> bool) -> Option<f32> {
+    /// The nearest point to `point`, within `radius`, on the triangles that
+    /// `accept` takes (by their corners).
+    pub fn nearest(&self, point: Vec3, radius: f32, accept: impl Fn(&[Vec3; 3]) -> bool) -> Option<Nearest> {
         let mut best = radius * radius;
-        let mut found = false;
+        let mut found = None;
         let mut stack: Vec<u32> = if self.nodes.is_empty() { vec![] } else { vec![0] };
         while let Some(index) = stack.pop() {
             let node = &self.nodes[index as usize];
-            let nearest = point.clamp(Vec3::from(node.min), Vec3::from(node.max));
-            if (nearest - point).length_squared() > best {
+            if box_distance_squared(node, point) > best {
                 continue;
             }
             if node.count == 0 {
                 stack.extend([node.first, node.first + 1]);
                 continue;
             }
-            for corners in &self.triangles[node.first as usize..(node.first + node.count) as usize] {
-                let d = (closest_point(point, corners) - point).length_squared();
+            for triangle in node.first..node.first + node.count {
+                let corners = &self.triangles[triangle as usize];
+                let at = closest_point(point, corners);
+                let d = (at - point).length_squared();
                 if d <= best && accept(corners) {
                     best = d;
-                    found = true;
+                    found = Some(Nearest { point: at, distance: d.sqrt(), triangle });
                 }
             }
         }
-        found.then(|| best.sqrt())
+        found
     }
+
+    /// Calls `visit` with the corners of every triangle whose tree leaf comes
+    /// within `radius` of `point`: at least those that come so near themselves.
+    pub fn near(&self, point: Vec3, radius: f32, mut visit: impl FnMut(&[Vec3; 3])) {
+        let mut stack: Vec<u32> = if self.nodes.is_empty() { vec![] } else { vec![0] };
+        while let Some(index) = stack.pop() {
+            let node = &self.nodes[index as usize];
+            if box_distance_squared(node, point) > radius * radius {
+                continue;
+            }
+            if node.count == 0 {
+                stack.extend([node.first, node.first + 1]);
+            } else {
+                self.triangles[node.first as usize..(node.first + node.count) as usize].iter().for_each(&mut visit);
+            }
+        }
+    }
+}
+
+/// A point on a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Nearest {
+    /// The point.
+    pub point: Vec3,
+    /// Its distance from where the search began, metres.
+    pub distance: f32,
+    /// The triangle, as numbered in [`Tracer::triangles`].
+    pub triangle: u32,
+}
+
+fn box_distance_squared(node: &Node, point: Vec3) -> f32 {
+    (point.clamp(Vec3::from(node.min), Vec3::from(node.max)) - point).length_squared()
 }
 
 /// Levels of the tree. Children always follow their parent's chain, so a cycle
@@ -389,7 +422,11 @@ mod tests {
                 .min_by(f32::total_cmp)
                 .unwrap();
             let found = tracer.nearest(ray.origin, 5.0, |_| true).unwrap();
-            assert!((found - brute).abs() < 1e-6);
+            assert!((found.distance - brute).abs() < 1e-6);
+            assert!((found.point - ray.origin).length() - brute < 1e-6);
+            let mut near = 0;
+            tracer.near(ray.origin, brute, |_| near += 1);
+            assert!(near > 0);
             assert_eq!(tracer.nearest(ray.origin, brute * 0.99, |_| true), None);
         }
     }
