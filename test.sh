@@ -11,7 +11,7 @@ if ! command -v cc >/dev/null; then
     echo "test.sh: no C linker: install one (on Debian: apt-get install gcc libc6-dev)" >&2
     exit 1
 fi
-cargo build --release --locked
+cargo test --release --locked --workspace --no-run
 if missing; then
     as_root=""
     [ "$(id -u)" = 0 ] || as_root="sudo -n"

@@ -12,7 +12,9 @@ use std::{collections::BTreeMap, fs, io, path::Path};
 /// Named layers of one resolution, with text attributes.
 ///
 /// In the file, layer `name` is the channel `name.Y`, as OpenEXR viewers expect
-/// of grey layers; attributes carry the prefix `aogauge:`.
+/// of grey layers; the attributes are one JSON object in the text attribute
+/// `aogauge` (OpenEXR text is not Unicode, and the order of several attributes
+/// would make bytes differ from one write to the next).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Layers {
     /// Width and height in pixels.
@@ -23,8 +25,8 @@ pub struct Layers {
     pub attributes: BTreeMap<String, String>,
 }
 
-/// Prefix of our attributes in the file.
-const PREFIX: &str = "aogauge:";
+/// Our attribute in the file.
+const ATTRIBUTE: &str = "aogauge";
 
 /// More bytes of pixels than this for a byte of file is no honest compression.
 const MAX_RATIO: u64 = 2000;
@@ -48,7 +50,7 @@ impl Layers {
     }
 
     /// Writes an OpenEXR file, ZIP compressed, 32-bit floats. The bytes depend on
-    /// the content alone where there is at most one attribute.
+    /// the content alone.
     ///
     /// # Errors
     /// Where the file cannot be written.
@@ -60,9 +62,9 @@ impl Layers {
             .map(|(name, values)| AnyChannel::new(format!("{name}.Y").as_str(), FlatSamples::F32(values.clone())))
             .collect();
         let mut attributes = LayerAttributes::default();
-        for (name, value) in &self.attributes {
-            let text = Text::new_or_none(value).unwrap_or_default();
-            attributes.other.insert(Text::from(format!("{PREFIX}{name}").as_str()), AttributeValue::Text(text));
+        if !self.attributes.is_empty() {
+            let text = Text::from(ascii_json(&self.attributes).as_str());
+            attributes.other.insert(Text::from(ATTRIBUTE), AttributeValue::Text(text));
         }
         let layer = Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, AnyChannels::sort(channels));
         write_whole(path, |buffer| {
@@ -115,12 +117,29 @@ impl Layers {
             layers.layers.insert(name, channel.sample_data.values_as_f32().collect());
         }
         for (name, value) in layer.attributes.other {
-            if let (Some(name), AttributeValue::Text(text)) = (name.to_string().strip_prefix(PREFIX), value) {
-                layers.attributes.insert(name.to_owned(), text.to_string());
+            if let (ATTRIBUTE, AttributeValue::Text(text)) = (name.to_string().as_str(), value) {
+                layers.attributes = serde_json::from_str(&text.to_string())
+                    .map_err(|e| DiskError::content(path, format!("the attribute '{ATTRIBUTE}' is broken: {e}")))?;
             }
         }
         Ok(layers)
     }
+}
+
+/// A JSON object in ASCII: everything else as `\u` escapes.
+fn ascii_json(attributes: &BTreeMap<String, String>) -> String {
+    let json = serde_json::json!(attributes).to_string();
+    let mut ascii = String::with_capacity(json.len());
+    for c in json.chars() {
+        if c.is_ascii() {
+            ascii.push(c);
+        } else {
+            for unit in c.encode_utf16(&mut [0; 2]) {
+                ascii += &format!("\\u{unit:04x}");
+            }
+        }
+    }
+    ascii
 }
 
 /// SHA-256 over the bits of every value: the same for the same picture, whatever
@@ -153,7 +172,7 @@ mod tests {
         let mut layers = Layers::new([3, 2])
             .with("mean", vec![0.0, 0.25, 1.0, f32::NAN, -2.5, 1e-30])
             .with("variance", vec![0.5; 6]);
-        layers.attributes.insert("reason".into(), "first, with a \"quote\"".into());
+        layers.attributes.insert("reason".into(), "größer Ω → 🙂 \"ok\"\n".into());
         layers
     }
 

@@ -9,6 +9,8 @@ use crate::{
     disk::{DiskError, read_text, write_whole},
     gate::{Outcome, Verdict},
     metrics::{Metric, artifact::Brighter, profile::Curve, regions::Region},
+    render::Estimator,
+    scenes::check_name,
     suite::Case,
 };
 use schemars::JsonSchema;
@@ -16,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use std::{
     collections::BTreeMap,
     fs, io,
-    path::{Path, PathBuf},
+    path::{Component, Path, PathBuf},
 };
 
 /// Version of the record's format. Readers refuse others.
@@ -72,6 +74,8 @@ pub struct SuiteInfo {
     pub golden_rays: Option<u32>,
     /// Estimator names, in order; the first of kind classic is `classic`.
     pub estimators: Vec<String>,
+    /// What each of them computes.
+    pub methods: BTreeMap<String, Estimator>,
     /// The name of the classic estimator.
     pub classic: String,
 }
@@ -122,7 +126,7 @@ pub struct Summary {
     pub pass: usize,
     /// Verdicts that failed.
     pub fail: usize,
-    /// Verdicts that the data do not decide.
+    /// Verdicts that the data do not decide, and gates idle without excuse.
     pub inconclusive: usize,
     /// Failures that are known and explained.
     pub known_failures: usize,
@@ -134,12 +138,12 @@ pub struct Summary {
 
 impl Summary {
     /// Counts.
-    pub fn new(verdicts: &[Verdict], cases: &[CaseRecord]) -> Self {
+    pub fn new(verdicts: &[Verdict], idle: &[IdleGate], cases: &[CaseRecord]) -> Self {
         let count = |o: Outcome| verdicts.iter().filter(|v| v.outcome == o).count();
         Summary {
             pass: count(Outcome::Pass),
             fail: count(Outcome::Fail),
-            inconclusive: count(Outcome::Inconclusive),
+            inconclusive: count(Outcome::Inconclusive) + idle.iter().filter(|g| !g.excused).count(),
             known_failures: count(Outcome::KnownFailure),
             cases: cases.len(),
             failed_cases: cases.iter().filter(|c| c.error.is_some()).count(),
@@ -155,6 +159,9 @@ pub struct IdleGate {
     pub gate: String,
     /// Why.
     pub reason: String,
+    /// Whether that is no fault of the run: there was no GPU for a gate on the
+    /// GPU. A gate that is idle without excuse is inconclusive.
+    pub excused: bool,
 }
 
 /// What was found of a scene, whatever the estimator.
@@ -202,18 +209,29 @@ pub struct SceneRecord {
 pub struct JudgeRecord {
     /// K(Q).
     pub contrast: Metric,
-    /// Q of footprint, left and right, each with its 95 % interval.
-    pub q: BTreeMap<Region, [f64; 3]>,
+    /// Q of footprint, left and right.
+    pub q: BTreeMap<Region, RegionQ>,
     /// Paths a pixel in one replicate.
     pub paths: u32,
     /// Replicates it took.
     pub replicates: u32,
-    /// Half width of the widest 95 % interval of a region mean, relative.
-    pub precision: f64,
+    /// Half width of the widest 95 % interval of a region mean, relative; null
+    /// where it is not known.
+    pub precision: Option<f64>,
     /// The precision asked for.
     pub wanted: f64,
     /// Irradiance and Q, relative to the record.
     pub image: String,
+}
+
+/// Q of a region.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RegionQ {
+    /// The ratio of the region's mean irradiances.
+    pub value: Option<f64>,
+    /// Its 95 % interval.
+    pub interval: Option<[f64; 2]>,
 }
 
 /// What was found in a case.
@@ -280,7 +298,28 @@ impl Record {
                 format!("record version {} is not supported, this tool reads version {VERSION}", versioned.version),
             ));
         }
-        serde_json::from_str(&text).map_err(malformed)
+        let record: Record = serde_json::from_str(&text).map_err(malformed)?;
+        record.check_names().map_err(|e| DiskError::content(&path, e))?;
+        Ok(record)
+    }
+
+    /// Names become file names and image paths are followed, so neither may lead
+    /// out of the folder they belong to.
+    fn check_names(&self) -> Result<(), String> {
+        let cases = self.cases.iter().flat_map(|c| [&c.case.scene, &c.case.estimator, &c.case.renderer]);
+        let scenes = self.scenes.iter().map(|s| &s.name);
+        for name in cases.chain(scenes).chain(&self.suite.estimators) {
+            check_name(name)?;
+        }
+        let of_cases = self.cases.iter().filter_map(|c| c.image.as_ref());
+        let of_scenes = self.scenes.iter().flat_map(|s| [&s.image, &s.look]);
+        let of_judges = self.scenes.iter().filter_map(|s| s.judge.as_ref().map(|j| &j.image));
+        for image in of_cases.chain(of_scenes).chain(of_judges) {
+            if !Path::new(image).components().all(|c| matches!(c, Component::Normal(_))) {
+                return Err(format!("the image path '{image}' leads out of the record"));
+            }
+        }
+        Ok(())
     }
 
     /// Text for people: `5 passed, 1 failed, ...`.
@@ -304,13 +343,18 @@ pub struct RecordFolder {
 }
 
 impl RecordFolder {
-    /// Makes an empty folder for a record. A folder of that name that holds a
-    /// record, or what a killed run left, is moved aside to `NAME.previous`
-    /// first; any other folder that is not empty is refused.
+    /// Makes an empty folder for a record. A record of that name is moved aside to
+    /// `NAME.previous` first, what a killed run left is removed; any other folder
+    /// that is not empty is refused.
     ///
     /// # Errors
     /// Where the folder cannot be written, or holds something else.
     pub fn create(path: &Path) -> Result<Self, DiskError> {
+        // Without a slash at its end, so that a name can be appended.
+        let path = &path.components().collect::<PathBuf>();
+        if path.file_name().is_none() {
+            return Err(DiskError::content(path, "name a folder for the record, not one that holds others"));
+        }
         let occupied = match fs::read_dir(path) {
             Ok(mut entries) => entries.next().is_some(),
             Err(e) if e.kind() == io::ErrorKind::NotFound => false,
@@ -323,19 +367,12 @@ impl RecordFolder {
                     "the output folder holds files that are not a record: name another folder",
                 ));
             }
-            let mut aside = path.as_os_str().to_owned();
-            aside.push(".previous");
-            let aside = PathBuf::from(aside);
-            if aside.exists() {
-                if !aside.join(FILE).exists() && !aside.join(BEGUN).exists() {
-                    return Err(DiskError::content(
-                        &aside,
-                        "the older record cannot be moved here: the folder holds something else",
-                    ));
-                }
-                fs::remove_dir_all(&aside).map_err(DiskError::io(&aside, "remove the record before last"))?;
+            if path.join(FILE).exists() {
+                move_aside(path)?;
+            } else {
+                // What a killed run left is worth less than the record before it.
+                fs::remove_dir_all(path).map_err(DiskError::io(path, "remove what an unfinished run left"))?;
             }
-            fs::rename(path, &aside).map_err(DiskError::io(path, "move the older record aside"))?;
         }
         fs::create_dir_all(path).map_err(DiskError::io(path, "create the output folder"))?;
         write_whole(&path.join(BEGUN), |_| Ok(()))?;
@@ -352,11 +389,30 @@ impl RecordFolder {
     /// # Errors
     /// Where it cannot be written.
     pub fn commit(&self, record: &Record) -> Result<(), DiskError> {
-        write_whole(&self.path.join(FILE), |buffer| {
-            serde_json::to_writer_pretty(&mut *buffer, record)?;
-            io::Write::write_all(buffer, b"\n")
-        })?;
+        let path = self.path.join(FILE);
+        let unfit = |e: serde_json::Error| DiskError::content(&path, format!("the record cannot be written: {e}"));
+        let text = serde_json::to_string_pretty(record).map_err(unfit)?;
+        // JSON has no NaN and no infinity: what could not be read must not look whole.
+        serde_json::from_str::<Record>(&text).map_err(unfit)?;
+        write_whole(&path, |buffer| io::Write::write_all(buffer, format!("{text}\n").as_bytes()))?;
         let begun = self.path.join(BEGUN);
         fs::remove_file(&begun).map_err(DiskError::io(&begun, "remove the mark of a running run"))
     }
+}
+
+/// Moves a record to `NAME.previous`, in place of the record before.
+fn move_aside(path: &Path) -> Result<(), DiskError> {
+    let mut aside = path.as_os_str().to_owned();
+    aside.push(".previous");
+    let aside = PathBuf::from(aside);
+    if aside.exists() {
+        if !aside.join(FILE).exists() && !aside.join(BEGUN).exists() {
+            return Err(DiskError::content(
+                &aside,
+                "the older record cannot be moved here: the folder holds something else",
+            ));
+        }
+        fs::remove_dir_all(&aside).map_err(DiskError::io(&aside, "remove the record before last"))?;
+    }
+    fs::rename(path, &aside).map_err(DiskError::io(path, "move the older record aside"))
 }

@@ -5,23 +5,32 @@ use crate::{
     gate::Verdict,
     layers::{Layers, pixel_hash},
     metrics::{
-        Absent, Metric,
-        artifact::Method as Measured,
+        Absent, Metric, MetricName,
+        artifact::{Converged, Method as Measured},
         error,
         judge::{Judge, Pair},
         profile,
         regions::{Region, Regions},
     },
     record::{
-        CaseRecord, IdleGate, JudgeRecord, Machine, Record, RecordFolder, SceneRecord, SuiteInfo, Summary, Timing,
-        VERSION,
+        CaseRecord, IdleGate, JudgeRecord, Machine, Record, RecordFolder, RegionQ, SceneRecord, SuiteInfo, Summary,
+        Timing, VERSION,
     },
     render::{Frame, Geometry, Job, Loaded, RenderError, Renderer, gbuffer::GBuffer, path},
     scenes::{Scene, View},
-    stats::mean_variance,
+    stats::{Estimate, mean_variance},
     suite::{Case, Plan, Suite},
 };
 use std::{collections::BTreeMap, time::Instant};
+
+/// Images of one scene that are held at once, at most.
+const MAX_GIB: f64 = 8.0;
+
+/// Paths a pixel that look for any light at all.
+const LIGHT_PATHS: u32 = 4;
+
+/// Independent images that a converged image is the mean of.
+const CONVERGED_REPLICATES: u32 = 4;
 
 /// Added to the seed for images that must not share random numbers with the
 /// replicates they are compared with.
@@ -51,6 +60,24 @@ pub enum RunError {
         /// The object it sees.
         object: String,
     },
+    /// No light reaches the receiver, so there is nothing to judge.
+    #[error(
+        "scene '{scene}': no light reaches the receiver even without the occluder; check environment and the openings towards it"
+    )]
+    NoLight {
+        /// The scene.
+        scene: String,
+    },
+    /// The images of a scene would not fit into memory.
+    #[error(
+        "scene '{scene}': its cases would hold {gib:.1} GiB of images at once, more than {MAX_GIB} GiB; lower replicates or measure.resolution"
+    )]
+    TooMuch {
+        /// The scene.
+        scene: String,
+        /// What it would need.
+        gib: f64,
+    },
     /// The measure view of a scene sees nothing.
     #[error(
         "scene '{scene}': the measure view sees no surface; check measure.center, measure.normal and measure.clearance"
@@ -74,52 +101,71 @@ pub fn steps(plan: &Plan<'_>) -> usize {
     plan.cases.len() + plan.suite.scenes.len() * per_scene
 }
 
-/// Runs a plan and commits its record.
-///
-/// A case whose renderer fails ends with its error; the others go on. `gpu` is
-/// used for the plan's cases on `gpu`.
-///
-/// # Errors
-/// Where the folder cannot be written, or the CPU reference fails.
-pub fn run(
-    plan: &Plan<'_>,
-    cpu: &dyn Renderer,
-    gpu: Option<&dyn Renderer>,
-    machine: Machine,
-    folder: &RecordFolder,
-    observer: &dyn Observer,
-) -> Result<Record, RunError> {
-    let start = Instant::now();
-    let mut timing = Timing {
-        began: jiff::Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string(),
-        threads: rayon::current_num_threads(),
-        ..Timing::default()
-    };
-    let mut progress = Progress { observer, done: 0, total: steps(plan) };
-    let (mut scenes, mut cases) = (Vec::new(), Vec::new());
-    for scene in &plan.suite.scenes {
-        let set = Set::new(plan, scene, folder)?;
-        let (scene_record, case_records) = set.run(cpu, gpu, &mut progress, &mut timing)?;
-        scenes.push(scene_record);
-        cases.extend(case_records);
+/// A plan whose scenes are loaded and checked. Whatever a scene file gets wrong
+/// is found here, before anything is written.
+pub struct Prepared<'a> {
+    plan: &'a Plan<'a>,
+    sets: Vec<Set<'a>>,
+}
+
+impl<'a> Prepared<'a> {
+    /// Builds the trees, sees what the measure views see, finds the regions, and
+    /// makes sure that light reaches what is to be judged.
+    ///
+    /// # Errors
+    /// [`RunError`], which names the scene and the field.
+    pub fn new(plan: &'a Plan<'a>) -> Result<Self, RunError> {
+        let sets = plan.suite.scenes.iter().map(|scene| Set::new(plan, scene)).collect::<Result<_, _>>()?;
+        Ok(Prepared { plan, sets })
     }
-    timing.seconds = start.elapsed().as_secs_f64();
-    let (verdicts, idle_gates) = verdicts(plan, &scenes, &cases);
-    let record = Record {
-        version: VERSION,
-        tool: env!("CARGO_PKG_VERSION").to_owned(),
-        suite: suite_info(plan.suite),
-        seed: plan.seed,
-        machine,
-        summary: Summary::new(&verdicts, &cases),
-        verdicts,
-        idle_gates,
-        scenes,
-        cases,
-        timing,
-    };
-    folder.commit(&record)?;
-    Ok(record)
+
+    /// Runs the plan and commits its record.
+    ///
+    /// A case whose renderer fails ends with its error; the others go on. `gpu`
+    /// is used for the plan's cases on `gpu`.
+    ///
+    /// # Errors
+    /// Where a file cannot be written, or the CPU reference fails.
+    pub fn run(
+        &self,
+        cpu: &dyn Renderer,
+        gpu: Option<&dyn Renderer>,
+        machine: Machine,
+        folder: &RecordFolder,
+        observer: &dyn Observer,
+    ) -> Result<Record, RunError> {
+        let plan = self.plan;
+        let start = Instant::now();
+        let mut timing = Timing {
+            began: jiff::Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string(),
+            threads: rayon::current_num_threads(),
+            ..Timing::default()
+        };
+        let mut progress = Progress { observer, done: 0, total: steps(plan) };
+        let (mut scenes, mut cases) = (Vec::new(), Vec::new());
+        for set in &self.sets {
+            let (scene_record, case_records) = set.run(cpu, gpu, folder, &mut progress, &mut timing)?;
+            scenes.push(scene_record);
+            cases.extend(case_records);
+        }
+        timing.seconds = start.elapsed().as_secs_f64();
+        let (verdicts, idle_gates) = verdicts(plan, &machine, &scenes, &cases);
+        let record = Record {
+            version: VERSION,
+            tool: env!("CARGO_PKG_VERSION").to_owned(),
+            suite: suite_info(plan.suite),
+            seed: plan.seed,
+            machine,
+            summary: Summary::new(&verdicts, &idle_gates, &cases),
+            verdicts,
+            idle_gates,
+            scenes,
+            cases,
+            timing,
+        };
+        folder.commit(&record)?;
+        Ok(record)
+    }
 }
 
 fn suite_info(suite: &Suite) -> SuiteInfo {
@@ -130,13 +176,20 @@ fn suite_info(suite: &Suite) -> SuiteInfo {
         converged_rays: suite.file.converged_rays.get(),
         golden_rays: suite.file.golden_rays.map(crate::suite::Rays::get),
         estimators: suite.methods.iter().map(|m| m.name.clone()).collect(),
+        methods: suite.methods.iter().map(|m| (m.name.clone(), m.estimator)).collect(),
         classic: suite.methods[suite.classic()].name.clone(),
     }
 }
 
 /// Holds every gate against every case it applies to. Failures come first.
-fn verdicts(plan: &Plan<'_>, scenes: &[SceneRecord], cases: &[CaseRecord]) -> (Vec<Verdict>, Vec<IdleGate>) {
+fn verdicts(
+    plan: &Plan<'_>,
+    machine: &Machine,
+    scenes: &[SceneRecord],
+    cases: &[CaseRecord],
+) -> (Vec<Verdict>, Vec<IdleGate>) {
     let (mut verdicts, mut idle) = (Vec::new(), Vec::new());
+    let no_gpu = !plan.cases.iter().any(|c| c.renderer == "gpu");
     for gate in &plan.suite.gates {
         let before = verdicts.len();
         for scene in scenes.iter().filter(|s| gate.applies_to_judge(&s.name)) {
@@ -146,22 +199,26 @@ fn verdicts(plan: &Plan<'_>, scenes: &[SceneRecord], cases: &[CaseRecord]) -> (V
             };
             verdicts.push(gate.verdict(&scene.name, None, &metric));
         }
-        let mut failed = 0;
         for record in cases.iter().filter(|c| gate.applies_to(&c.case)) {
-            match record.metric(gate.metric, gate.region) {
-                Some(metric) => verdicts.push(gate.verdict(&record.case.scene, Some(&record.case), metric)),
-                None => failed += usize::from(record.error.is_some()),
+            if let Some(metric) = record.metric(gate.metric, gate.region) {
+                verdicts.push(gate.verdict(&record.case.scene, Some(&record.case), metric));
             }
         }
-        if verdicts.len() == before {
-            let reason = if failed > 0 {
-                "every case it holds for ended with an error"
-            } else if gate.renderers.iter().any(|r| r == "gpu") && !plan.cases.iter().any(|c| c.renderer == "gpu") {
-                "this run had no GPU adapter"
-            } else {
-                "no case of this run has this metric"
-            };
-            idle.push(IdleGate { gate: gate.name.clone(), reason: reason.to_owned() });
+        let excused = no_gpu && !gate.renderers.is_empty() && gate.renderers.iter().all(|r| r == "gpu");
+        if excused {
+            let reason = format!("this run used no GPU: {}", machine.gpu);
+            idle.push(IdleGate { gate: gate.name.clone(), reason, excused });
+        } else if verdicts.len() == before {
+            let reason = "no case of this run has this metric".to_owned();
+            idle.push(IdleGate { gate: gate.name.clone(), reason, excused });
+        } else {
+            // A scene that the gate names must not drop out of it unseen.
+            for scene in &gate.scenes {
+                if !verdicts[before..].iter().any(|v: &Verdict| v.scene == *scene) {
+                    let absent = Absent("no case of this scene has this metric".into());
+                    verdicts.push(gate.verdict(scene, None, &Metric::new(gate.metric, gate.region, Err(absent))));
+                }
+            }
         }
     }
     verdicts.sort_by_key(|v| v.outcome);
@@ -188,8 +245,10 @@ impl Progress<'_> {
 struct Set<'a> {
     plan: &'a Plan<'a>,
     scene: &'a Scene,
-    folder: &'a RecordFolder,
     geometry: Geometry,
+    /// The scene without its occluder, traced from the same points; None where
+    /// there is nothing to judge.
+    twin: Option<Geometry>,
     view: View,
     gbuffer: GBuffer,
     regions: Regions,
@@ -198,6 +257,8 @@ struct Set<'a> {
 /// What the judge found, with its curve.
 struct Judged {
     judge: Judge,
+    /// Why metrics must not use it.
+    usable: Result<(), Absent>,
     record: JudgeRecord,
     curve: profile::Curve,
 }
@@ -209,26 +270,44 @@ struct Images {
 }
 
 impl<'a> Set<'a> {
-    fn new(plan: &'a Plan<'a>, scene: &'a Scene, folder: &'a RecordFolder) -> Result<Self, RunError> {
-        let geometry = Geometry::new(scene).map_err(render_error(scene))?;
+    fn new(plan: &'a Plan<'a>, scene: &'a Scene) -> Result<Self, RunError> {
+        let name = || scene.name.clone();
         let view = scene.measure.view();
+        let cases = plan.cases.iter().filter(|c| c.scene == scene.name).count();
+        let images = cases as f64 * f64::from(plan.suite.file.replicates.get());
+        let gib = images * view.pixels() as f64 * 4.0 / f64::from(1 << 30);
+        if gib > MAX_GIB {
+            return Err(RunError::TooMuch { scene: name(), gib });
+        }
+        let geometry = Geometry::new(scene).map_err(render_error(scene))?;
         let gbuffer = GBuffer::new(&geometry.tracer, &view);
         let owner: Vec<usize> = scene.triangles().map(|(object, _)| object).collect();
-        let seen = gbuffer.surfaces.iter().flatten().map(|s| &scene.objects[owner[s.triangle as usize]]);
-        if let Some(object) = seen.into_iter().find(|o| o.occluder) {
-            return Err(RunError::SeesOccluder { scene: scene.name.clone(), object: object.name.clone() });
+        let mut seen = gbuffer.surfaces.iter().flatten().map(|s| &scene.objects[owner[s.triangle as usize]]);
+        if let Some(object) = seen.find(|o| o.occluder) {
+            return Err(RunError::SeesOccluder { scene: name(), object: object.name.clone() });
         }
-        let regions = Regions::new(scene, &geometry.tracer, &gbuffer).map_err(|e| render_error(scene)(e.into()))?;
+        let regions = Regions::new(scene, &geometry.tracer, &gbuffer);
         if regions.pixels(Region::All).is_empty() {
-            return Err(RunError::SeesNothing { scene: scene.name.clone() });
+            return Err(RunError::SeesNothing { scene: name() });
         }
-        Ok(Set { plan, scene, folder, geometry, view, gbuffer, regions })
+        let mut twin = None;
+        if scene.has_occluder() {
+            let mut bare = Geometry::new(&scene.twin()).map_err(render_error(scene))?;
+            bare.tracer.set_offset(geometry.tracer.offset());
+            let lit = path::irradiance(&bare, &gbuffer, LIGHT_PATHS, plan.seed, 0).iter().any(|e| *e > 0.0);
+            if !lit {
+                return Err(RunError::NoLight { scene: name() });
+            }
+            twin = Some(bare);
+        }
+        Ok(Set { plan, scene, geometry, twin, view, gbuffer, regions })
     }
 
     fn run(
         &self,
         cpu: &dyn Renderer,
         gpu: Option<&dyn Renderer>,
+        folder: &RecordFolder,
         progress: &mut Progress<'_>,
         timing: &mut Timing,
     ) -> Result<(SceneRecord, Vec<CaseRecord>), RunError> {
@@ -236,20 +315,23 @@ impl<'a> Set<'a> {
         let fail = render_error(self.scene);
         let mut loaded_cpu = cpu.load(&self.geometry).map_err(&fail)?;
         progress.begin(&format!("{}: judge", self.scene.name));
-        let judged = self.judge(timing)?;
+        let judged = self.judge(folder, timing)?;
         progress.end();
         let mut converged = Vec::with_capacity(methods.len());
         for method in methods {
             progress.begin(&format!("{}: converged {}", self.scene.name, method.name));
-            let job = Job {
-                view: &self.view,
-                estimator: method.estimator,
-                ao: self.scene.ao,
-                rays: self.plan.suite.file.converged_rays.get(),
-                seed: self.plan.seed.wrapping_add(CONVERGED),
-                replicate: 0,
-            };
-            converged.push(loaded_cpu.render(&job).map_err(&fail)?.values);
+            let replicates = (0..CONVERGED_REPLICATES).map(|replicate| {
+                let job = Job {
+                    view: &self.view,
+                    estimator: method.estimator,
+                    ao: self.scene.ao,
+                    rays: self.plan.suite.file.converged_rays.get() / CONVERGED_REPLICATES,
+                    seed: self.plan.seed.wrapping_add(CONVERGED),
+                    replicate,
+                };
+                Ok(loaded_cpu.render(&job).map_err(&fail)?.values)
+            });
+            converged.push(Converged::new(replicates.collect::<Result<_, RunError>>()?));
             progress.end();
         }
         let mut loaded_gpu = gpu.map(|g| g.load(&self.geometry));
@@ -268,11 +350,11 @@ impl<'a> Set<'a> {
             images.insert(case.id(), rendered);
             progress.end();
         }
-        let records = self.case_records(&images, &converged, &judged)?;
+        let records = self.case_records(folder, &images, &converged, &judged)?;
         progress.begin(&format!("{}: pictures", self.scene.name));
-        let look = self.look(loaded_cpu.as_mut())?;
+        let look = self.look(folder, loaded_cpu.as_mut())?;
         progress.end();
-        let record = self.scene_record(&images, &converged, judged, look)?;
+        let record = self.scene_record(folder, &images, &converged, judged, look)?;
         Ok((record, records))
     }
 
@@ -304,33 +386,58 @@ impl<'a> Set<'a> {
 
     /// Traces the scene and its twin, adding replicates until every region mean
     /// is as precise as the suite asks.
-    fn judge(&self, timing: &mut Timing) -> Result<Result<Judged, Absent>, RunError> {
-        if !self.scene.has_occluder() {
+    fn judge(&self, folder: &RecordFolder, timing: &mut Timing) -> Result<Result<Judged, Absent>, RunError> {
+        let Some(twin) = &self.twin else {
             return Ok(Err(Absent("the scene has no occluder to judge".into())));
-        }
-        if let Some(small) = Judge::REGIONS.into_iter().find_map(|r| self.regions.measurable(r).err()) {
-            return Ok(Err(small));
-        }
+        };
         let start = Instant::now();
         let settings = &self.plan.suite.file.judge;
-        let twin = Geometry::new(&self.scene.twin()).map_err(render_error(self.scene))?;
         let seed = self.plan.seed.wrapping_add(JUDGE);
+        let most = settings.max_replicates.get();
         let mut pairs: Vec<Pair> = Vec::new();
         let judge = loop {
             let first = pairs.len() as u32;
-            let last = (first + settings.replicates.get()).min(settings.max_replicates.get().max(2));
+            let last = (first + settings.replicates.get()).min(most);
             pairs.extend((first..last).map(|r| Pair {
                 with: path::irradiance(&self.geometry, &self.gbuffer, settings.paths.get(), seed, r),
-                without: path::irradiance(&twin, &self.gbuffer, settings.paths.get(), seed, r),
+                without: path::irradiance(twin, &self.gbuffer, settings.paths.get(), seed, r),
             }));
             let judge = match Judge::new(&pairs, &self.regions) {
                 Ok(judge) => judge,
                 Err(absent) => return Ok(Err(absent)),
             };
-            if judge.widest() <= settings.precision || last >= settings.max_replicates.get() {
+            if judge.widest() <= settings.precision || last >= most {
                 break judge;
             }
         };
+        if !judge.has_light() {
+            return Err(RunError::NoLight { scene: self.scene.name.clone() });
+        }
+        let precision = judge.widest();
+        let sure = precision <= settings.precision;
+        let vague = || {
+            Absent(format!(
+                "the judge is less precise than asked: {:.2} % of a region mean after {most} replicates, {:.2} % wanted",
+                precision * 100.0,
+                settings.precision * 100.0
+            ))
+        };
+        let contrast = if sure { Ok(judge.contrast()) } else { Err(vague()) };
+        let record = JudgeRecord {
+            contrast: Metric::new(MetricName::JudgeContrast, None, contrast),
+            q: Judge::REGIONS.into_iter().filter_map(|r| Some((r, region_q(judge.q_of(r)?)))).collect(),
+            paths: settings.paths.get(),
+            replicates: pairs.len() as u32,
+            precision: precision.is_finite().then_some(precision),
+            wanted: settings.precision,
+            image: self.write_judge(folder, &judge)?,
+        };
+        let curve = profile::of_judge(&pairs, self.view.resolution[0] as usize);
+        timing.judges.insert(self.scene.name.clone(), start.elapsed().as_secs_f64());
+        Ok(Ok(Judged { usable: if sure { Ok(()) } else { Err(vague()) }, judge, record, curve }))
+    }
+
+    fn write_judge(&self, folder: &RecordFolder, judge: &Judge) -> Result<String, RunError> {
         let image = format!("images/{}/judge.exr", self.scene.name);
         let [with, without] = judge.irradiance.clone();
         Layers::new(self.view.resolution)
@@ -338,37 +445,19 @@ impl<'a> Set<'a> {
             .with("q-relative-se", judge.q_relative_se.clone())
             .with("irradiance-with", with)
             .with("irradiance-without", without)
-            .write(&self.folder.path().join(&image))?;
-        let q = Judge::REGIONS
-            .into_iter()
-            .filter_map(|region| {
-                let e = judge.q_of(region)?;
-                let [lo, hi] = e.interval(0.95);
-                Some((region, [e.value, lo, hi]))
-            })
-            .collect();
-        let record = JudgeRecord {
-            contrast: judge.contrast(),
-            q,
-            paths: settings.paths.get(),
-            replicates: pairs.len() as u32,
-            precision: judge.widest(),
-            wanted: settings.precision,
-            image,
-        };
-        let curve = profile::of_judge(&pairs, self.view.resolution[0] as usize);
-        timing.judges.insert(self.scene.name.clone(), start.elapsed().as_secs_f64());
-        Ok(Ok(Judged { judge, record, curve }))
+            .write(&folder.path().join(&image))?;
+        Ok(image)
     }
 
-    fn measured<'b>(&'b self, own: &'b Images, converged: &'b [f32]) -> Measured<'b> {
+    fn measured<'b>(&'b self, own: &'b Images, converged: &'b Converged) -> Measured<'b> {
         Measured { replicates: &own.replicates, converged, regions: &self.regions }
     }
 
     fn case_records(
         &self,
+        folder: &RecordFolder,
         images: &BTreeMap<String, Result<Images, RenderError>>,
-        converged: &[Vec<f32>],
+        converged: &[Converged],
         judged: &Result<Judged, Absent>,
     ) -> Result<Vec<CaseRecord>, RunError> {
         let classic = &self.plan.suite.methods[self.plan.suite.classic()].name;
@@ -391,10 +480,10 @@ impl<'a> Set<'a> {
             let others = Others {
                 classic: classic_method.filter(|_| case.estimator != *classic),
                 cpu,
-                judge: judged.as_ref().map(|j| &j.judge).map_err(Clone::clone),
+                judge: judged.as_ref().map_err(Clone::clone).and_then(|j| j.usable.clone().map(|()| &j.judge)),
                 occluder: self.scene.has_occluder(),
             };
-            let (image, hash) = self.write_case(case, &own.replicates)?;
+            let (image, hash) = self.write_case(folder, case, &own.replicates)?;
             records.push(CaseRecord {
                 case: case.clone(),
                 error: None,
@@ -408,7 +497,12 @@ impl<'a> Set<'a> {
 
     /// Writes mean, variance and replicates of a case; returns the path and the
     /// hash of the mean.
-    fn write_case(&self, case: &Case, replicates: &[Vec<f32>]) -> Result<(String, String), RunError> {
+    fn write_case(
+        &self,
+        folder: &RecordFolder,
+        case: &Case,
+        replicates: &[Vec<f32>],
+    ) -> Result<(String, String), RunError> {
         let image = format!("images/{}/{}.{}.{}.exr", case.scene, case.estimator, case.renderer, case.rays);
         let mut mean = Vec::with_capacity(self.view.pixels());
         let mut variance = Vec::with_capacity(self.view.pixels());
@@ -423,12 +517,12 @@ impl<'a> Set<'a> {
         for (r, values) in replicates.iter().enumerate() {
             layers = layers.with(&format!("replicate-{r:04}"), values.clone());
         }
-        layers.write(&self.folder.path().join(&image))?;
+        layers.write(&folder.path().join(&image))?;
         Ok((image, hash))
     }
 
     /// Pictures from the look view: every method, and the path tracer.
-    fn look(&self, cpu: &mut dyn Loaded) -> Result<String, RunError> {
+    fn look(&self, folder: &RecordFolder, cpu: &mut dyn Loaded) -> Result<String, RunError> {
         let view = self.scene.look.view();
         let rays = self.plan.suite.file.look_rays.get();
         let seed = self.plan.seed.wrapping_add(LOOK);
@@ -436,19 +530,20 @@ impl<'a> Set<'a> {
         for method in &self.plan.suite.methods {
             let job = Job { view: &view, estimator: method.estimator, ao: self.scene.ao, rays, seed, replicate: 0 };
             let frame = cpu.render(&job).map_err(render_error(self.scene))?;
-            layers = layers.with(&method.name, frame.values);
+            layers = layers.with(&format!("openness-{}", method.name), frame.values);
         }
         let gbuffer = GBuffer::new(&self.geometry.tracer, &view);
         let layers = layers.with("path-traced", path::irradiance(&self.geometry, &gbuffer, rays, seed, 0));
         let image = format!("images/{}/look.exr", self.scene.name);
-        layers.write(&self.folder.path().join(&image))?;
+        layers.write(&folder.path().join(&image))?;
         Ok(image)
     }
 
     fn scene_record(
         &self,
+        folder: &RecordFolder,
         images: &BTreeMap<String, Result<Images, RenderError>>,
-        converged: &[Vec<f32>],
+        converged: &[Converged],
         judged: Result<Judged, Absent>,
         look: String,
     ) -> Result<SceneRecord, RunError> {
@@ -466,9 +561,9 @@ impl<'a> Set<'a> {
             if let Ok(side) = measured.brighter() {
                 brighter.insert(method.name.clone(), side);
             }
-            layers = layers.with(&format!("converged-{}", method.name), converged.clone());
+            layers = layers.with(&format!("converged-{}", method.name), converged.mean.clone());
         }
-        layers.write(&self.folder.path().join(&image))?;
+        layers.write(&folder.path().join(&image))?;
         let most = self.plan.suite.file.rays.iter().map(|r| r.get()).max().unwrap_or(0);
         let mut profiles: Vec<profile::Curve> = self
             .cases()
@@ -540,6 +635,13 @@ fn metrics(method: &Measured<'_>, others: &Others<'_>) -> Vec<Metric> {
         metrics.push(error::renderer_difference(method.replicates, cpu, method.regions));
     }
     metrics
+}
+
+/// A ratio with its interval, where that is known.
+fn region_q(e: Estimate) -> RegionQ {
+    let [lo, hi] = e.interval(0.95);
+    let interval = [lo, hi].iter().all(|v| v.is_finite()).then_some([lo, hi]);
+    RegionQ { value: e.value.is_finite().then_some(e.value), interval }
 }
 
 fn render_error(scene: &Scene) -> impl Fn(RenderError) -> RunError + use<> {

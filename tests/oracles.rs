@@ -6,14 +6,15 @@
 use aogauge::{
     flatland::Slab,
     metrics::{
-        artifact::contrast,
-        regions::{Region, Regions},
+        artifact::{Converged, Method},
+        regions::Regions,
     },
     render::{
         Estimator, Geometry, Job, ReceiverPlane, Renderer, ao::Shading, cpu::Cpu, gbuffer::GBuffer, sampler::Sampler,
     },
     scenes::Scene,
     stats::{Estimate, sidak_alpha, upper_tail},
+    trace::Ray,
 };
 use glam::Vec3;
 use serde_json::Value;
@@ -73,6 +74,70 @@ fn render_point(geometry: &Geometry, scene: &Scene, t: f32, estimator: Estimator
         })
         .collect();
     Estimate::of_mean(&values)
+}
+
+/// Mistakes that the comparison must find.
+#[derive(Clone, Copy, PartialEq)]
+enum Mistake {
+    /// Secondary rays go one way from the middle only.
+    OneSided,
+    /// Directions are uniform over the hemisphere, not cosine distributed.
+    Uniform,
+}
+
+/// Openness over one replicate with a mistake in it, built from the same parts.
+fn mistaken(shading: &Shading<'_>, geometry: &Geometry, t: f32, ratio: f32, mistake: Mistake, salt: u32) -> f64 {
+    let sampler = Sampler::new(12, salt, 0);
+    let rays = 512;
+    let halves: u32 = (0..rays)
+        .map(|i| {
+            let [u, v] = sampler.pair(i, 0);
+            if mistake == Mistake::Uniform {
+                // cos(theta) = 1 - u in place of its square root.
+                let [primary, first, second] = shading.decide([1.0 - (1.0 - u) * (1.0 - u), v]);
+                return if primary { 0 } else { 2 - u32::from(first) - u32::from(second) };
+            }
+            if shading.decide([u, v])[0] {
+                return 0;
+            }
+            let (radius, n) = (0.25, Vec3::Y);
+            let (s, c) = (std::f32::consts::TAU * v).sin_cos();
+            let w = Vec3::new(u.sqrt() * c, (1.0 - u).sqrt(), u.sqrt() * s);
+            let d1 = w.cross(n).normalize();
+            let middle = Vec3::new(t, 2e-5, 0.1) + w * (0.5 * radius);
+            let hit = |d: Vec3| u32::from(geometry.tracer.occluded(&Ray::new(middle, d, ratio * radius)));
+            2 - hit(d1) - hit(w.cross(d1))
+        })
+        .sum();
+    f64::from(halves) / f64::from(2 * rays)
+}
+
+/// A one-sided secondary ray and a wrong cosine disagree with the reference at
+/// the test's own level, in most rows.
+#[test]
+fn a_one_sided_ray_and_a_wrong_cosine_are_found() {
+    let rows = reference(include_str!("reference/openness.json"));
+    let level = sidak_alpha(0.01, rows.len() * METHODS.len());
+    for (mistake, column, estimator) in [
+        (Mistake::OneSided, "ext2_c_R4_g1", COUNTS),
+        (Mistake::Uniform, "ext2_c_R4_g1", COUNTS),
+        (Mistake::Uniform, "ext_c", CLASSIC),
+    ] {
+        let mut rejected = 0;
+        for (r, row) in rows.iter().enumerate() {
+            let scene = scene(row);
+            let geometry = Geometry::new(&scene).unwrap();
+            let t = row["t"].as_f64().unwrap() as f32 / 100.0;
+            let shading = Shading::new(&geometry.tracer, Vec3::new(t, 0.0, 0.1), Vec3::Y, scene.ao, estimator);
+            let values: Vec<f64> = (0..64)
+                .map(|replicate| mistaken(&shading, &geometry, t, 0.25, mistake, (r * 64 + replicate) as u32))
+                .collect();
+            let e = Estimate::of_mean(&values);
+            let off = (e.value - row[column].as_f64().unwrap()).abs();
+            rejected += usize::from(e.se > 0.0 && 2.0 * upper_tail(e.df, off / e.se) < level);
+        }
+        assert!(rejected * 2 > rows.len(), "{column}: {rejected} of {}", rows.len());
+    }
 }
 
 /// How many of the reference's rows the renders disagree with, at alpha .01 over
@@ -139,15 +204,20 @@ fn highlight_contrast_agrees_with_the_reference() {
         let geometry = Geometry::new(&scene).unwrap();
         let view = scene.measure.view();
         let gbuffer = GBuffer::new(&geometry.tracer, &view);
-        let regions = Regions::new(&scene, &geometry.tracer, &gbuffer).unwrap();
+        let regions = Regions::new(&scene, &geometry.tracer, &gbuffer);
         for (column, estimator, ratio) in METHODS {
             scene.ao.secondary_radius = ratio * scene.ao.radius;
             let name = column.strip_prefix("ext2_c_").unwrap_or("classic");
-            let job = Job { view: &view, estimator, ao: scene.ao, rays: 256, seed: 3, replicate: 0 };
-            let frame = Cpu.load(&geometry).unwrap().render(&job).unwrap();
-            let mean = |region| regions.mean(region, &frame.values).unwrap();
-            let flank = (mean(Region::Left) + mean(Region::Right)) / 2.0;
-            let k = contrast(mean(Region::Footprint), flank);
+            let mut loaded = Cpu.load(&geometry).unwrap();
+            let mut render = |seed: u32| -> Vec<Vec<f32>> {
+                let job = |replicate| Job { view: &view, estimator, ao: scene.ao, rays: 64, seed, replicate };
+                (0..4).map(|replicate| loaded.render(&job(replicate)).unwrap().values).collect()
+            };
+            let (replicates, converged) = (render(3), Converged::new(render(4)));
+            let method = Method { replicates: &replicates, converged: &converged, regions: &regions };
+            let [weber, michelson] = method.contrasts();
+            let k = weber.value.unwrap();
+            assert!((michelson.value.unwrap() - k / (2.0 + k)).abs() < 1e-3, "K/(2 + K)");
             let expected = row[name]["K"].as_f64().unwrap();
             assert!((k - expected).abs() < 1e-2, "w {} m {} {name}: K = {k}, expected {expected}", row["w"], row["m"]);
         }

@@ -6,7 +6,7 @@ use aogauge::{
     record::{Machine, Record, RecordFolder},
     render::{Frame, Geometry, Job, Loaded, RenderError, Renderer, cpu::Cpu},
     report,
-    run::{Observer, run, steps},
+    run::{Observer, Prepared, steps},
     suite::{Plan, Platform, Suite},
 };
 use std::{cell::Cell, path::Path};
@@ -17,10 +17,6 @@ struct Failing;
 struct LoadedFailing<'a>(Box<dyn Loaded + 'a>);
 
 impl Renderer for Failing {
-    fn name(&self) -> &str {
-        "gpu"
-    }
-
     fn load<'a>(&'a self, geometry: &'a Geometry) -> Result<Box<dyn Loaded + 'a>, RenderError> {
         Ok(Box::new(LoadedFailing(Cpu.load(geometry)?)))
     }
@@ -57,7 +53,7 @@ description = "x"
 scenes = ["plane"]
 rays = [4, 8]
 replicates = 2
-converged_rays = 4
+converged_rays = 32
 look_rays = 1
 [[estimator]]
 name = "classic"
@@ -76,7 +72,8 @@ within = 0.01
     let folder = RecordFolder::create(&out).unwrap();
     let observer = Steps::default();
     let machine = Machine::here("a test".into(), Some(false));
-    let record = run(&plan, &Cpu, Some(&Failing), machine, &folder, &observer).unwrap();
+    let prepared = Prepared::new(&plan).unwrap();
+    let record = prepared.run(&Cpu, Some(&Failing), machine, &folder, &observer).unwrap();
     assert_eq!((observer.last.get() + 1, observer.total.get()), (steps(&plan), steps(&plan)));
     assert_eq!((record.summary.cases, record.summary.failed_cases, record.summary.pass), (4, 1, 1));
     let failed: Vec<_> = record.cases.iter().filter(|c| c.error.is_some()).collect();

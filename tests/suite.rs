@@ -50,7 +50,7 @@ fn the_built_in_suite_keeps_its_promises() {
         let judge = record.scenes.iter().find(|s| s.name == name).unwrap().judge.clone().unwrap();
         let [lo, hi] = judge.contrast.estimate().unwrap().interval(0.95);
         assert!(lo * sign > 0.0 && hi * sign > 0.0, "{name}: {lo} to {hi}");
-        assert!(judge.precision <= 0.02, "{name}: {}", judge.precision);
+        assert!(judge.precision.unwrap() <= 0.02, "{name}: {:?}", judge.precision);
     }
 
     // Every method in every scene, at both ray counts; both readings.

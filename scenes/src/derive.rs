@@ -1,6 +1,6 @@
 //! Views for scenes that give none: found from the sheet and the receiver.
 
-use crate::{LookView, MeasureView, Object};
+use crate::{LookView, MeasureView, Object, closest_point};
 use glam::{Mat3, Vec3};
 
 /// Points of the sheet that are looked at, at most.
@@ -114,7 +114,7 @@ fn stand(sheet: Vec3, receiver: &[Boxed], radius: f32) -> Option<Stand> {
         if (sheet.clamp(b.min, b.max) - sheet).length_squared() > best {
             continue;
         }
-        let at = nearest_on(sheet, &b.corners);
+        let at = closest_point(sheet, &b.corners);
         let d = (at - sheet).length_squared();
         if d < best {
             best = d;
@@ -128,23 +128,6 @@ fn stand(sheet: Vec3, receiver: &[Boxed], radius: f32) -> Option<Stand> {
     // A sheet that touches leaves no room for a view; one that stands beside the
     // receiver's rim and not over it is no sheet over a receiver.
     (gap > 1e-3 * radius && gap > 0.99 * best.sqrt()).then_some(Stand { sheet, base, normal, gap })
-}
-
-/// The nearest point of a triangle, by its plane and its edges.
-fn nearest_on(p: Vec3, &[a, b, c]: &[Vec3; 3]) -> Vec3 {
-    let n = (b - a).cross(c - a);
-    let inside = |u: Vec3, v: Vec3| (v - u).cross(p - u).dot(n) >= 0.0;
-    if inside(a, b) && inside(b, c) && inside(c, a) {
-        let n = n.normalize_or_zero();
-        return p - n * n.dot(p - a);
-    }
-    let on = |u: Vec3, v: Vec3| {
-        let e = v - u;
-        let t = (p - u).dot(e) / e.length_squared().max(f32::MIN_POSITIVE);
-        u + e * t.clamp(0.0, 1.0)
-    };
-    let candidates = [on(b, c), on(c, a)];
-    candidates.into_iter().fold(on(a, b), |m, q| if q.distance_squared(p) < m.distance_squared(p) { q } else { m })
 }
 
 /// The direction in the plane across `normal` in which points spread most, by

@@ -24,6 +24,6 @@ pub use bounded::check_name;
 pub use environment::{Environment, Portal};
 pub use file::SceneError;
 pub use material::{MAX_ALBEDO, Material, Texture, luminance};
-pub use mesh::{Mesh, MeshError};
+pub use mesh::{Mesh, MeshError, closest_point};
 pub use scene::{AoScale, Object, Scene};
 pub use view::{LookView, MeasureView, View};

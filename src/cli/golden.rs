@@ -91,21 +91,26 @@ fn verify(args: &Verify) -> Result<Exit, Failure> {
         tell(&case.line());
     }
     let count = |o: Outcome| checked.iter().filter(|c| c.outcome() == o).count();
-    let (pass, fail, missing) = (count(Outcome::Pass), count(Outcome::Fail), count(Outcome::Missing));
+    let [pass, fail, blind, missing, lost] =
+        [Outcome::Pass, Outcome::Fail, Outcome::Blind, Outcome::Missing, Outcome::Lost].map(count);
     tell(&format!(
-        "{pass} hold, {fail} differ, {missing} missing or unusable; family error {ALPHA}{}",
+        "{pass} hold, {fail} differ, {blind} too noisy to tell, {missing} missing or unusable, {lost} lost; family error {ALPHA}{}",
         stale(&checked).map_or_else(String::new, |s| format!("\n{s}"))
     ));
-    Ok(if missing > 0 {
+    Ok(if lost > 0 {
+        Exit::Incomplete
+    } else if missing > 0 {
         Exit::Golden
     } else if fail > 0 {
         Exit::Failed
+    } else if blind > 0 {
+        Exit::Inconclusive
     } else {
         Exit::Pass
     })
 }
 
-/// Many cases shifted one way by much the same is a stale reference, not noise.
+/// Most cases shifted one way is a stale reference, not noise.
 fn stale(checked: &[Checked]) -> Option<String> {
     let shifts: Vec<f64> = checked
         .iter()

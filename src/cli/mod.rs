@@ -89,7 +89,18 @@ macro_rules! usage {
         }
     )*};
 }
-usage!(DiskError, ReportError, RunError, SceneError, SuiteError);
+usage!(DiskError, ReportError, SceneError, SuiteError);
+
+impl From<RunError> for Failure {
+    fn from(e: RunError) -> Self {
+        let exit = match e {
+            // It began well and could not go on.
+            RunError::Disk(_) => Exit::Incomplete,
+            _ => Exit::Usage,
+        };
+        Failure { exit, message: e.to_string() }
+    }
+}
 
 impl Cli {
     /// Does what was asked.

@@ -5,7 +5,7 @@ use crate::{
     record::{Machine, Record, RecordFolder},
     render::{Renderer, cpu::Cpu, gpu::Gpu},
     report,
-    run::{self, Observer},
+    run::{Observer, Prepared},
     suite::{Plan, Platform, Suite},
 };
 use clap::ValueEnum;
@@ -52,6 +52,12 @@ enum Choice {
 /// Shows a bar on a terminal, and nothing elsewhere.
 struct Bar(ProgressBar);
 
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
 impl Observer for Bar {
     fn step(&self, done: usize, total: usize, what: &str) {
         self.0.set_length(total as u64);
@@ -65,26 +71,31 @@ fn bar() -> Bar {
     if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len}  {elapsed} (left {eta})  {wide_msg}") {
         bar.set_style(style);
     }
+    // A step may take many seconds; the clock goes on meanwhile.
+    bar.enable_steady_tick(std::time::Duration::from_millis(200));
     Bar(bar)
 }
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
     let suite = Suite::load(&args.suite)?;
     let (gpu, missing) = open(args.renderer)?;
-    let folder = RecordFolder::create(&args.out)?;
     let mut pool = rayon::ThreadPoolBuilder::new();
     if let Some(threads) = args.threads {
         pool = pool.num_threads(threads.into());
     }
     let pool = pool.build().map_err(|e| Failure::usage(format!("cannot start {:?} threads: {e}", args.threads)))?;
-    let record = pool.install(|| render(args, &suite, gpu.as_ref(), &missing, &folder))?;
+    let (record, folder) = pool.install(|| render(args, &suite, gpu.as_ref(), &missing))?;
     report::write(folder.path(), folder.path())?;
     tell(&format!(
         "{}\n{}\n{}: {}",
         report::table::plain(&record),
         record.summary_line(),
         folder.path().join(report::FILE).display(),
-        if exit(&record) == Exit::Pass { "pass" } else { "not a pass" },
+        match exit(&record) {
+            Exit::Pass if record.verdicts.is_empty() => "rendered; the suite has no gates",
+            Exit::Pass => "pass",
+            _ => "not a pass",
+        },
     ));
     if args.format == Format::Json {
         print(&json(&record)?)?;
@@ -92,13 +103,8 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     Ok(exit(&record))
 }
 
-fn render(
-    args: &Args,
-    suite: &Suite,
-    gpu: Option<&Gpu>,
-    missing: &str,
-    folder: &RecordFolder,
-) -> Result<Record, Failure> {
+/// Checks everything, then makes the folder, then renders.
+fn render(args: &Args, suite: &Suite, gpu: Option<&Gpu>, missing: &str) -> Result<(Record, RecordFolder), Failure> {
     let platform = match gpu {
         None => Platform::Cpu,
         Some(gpu) if gpu.is_software() && args.renderer == Choice::Auto => Platform::SoftwareGpu,
@@ -106,16 +112,16 @@ fn render(
     };
     let plan = Plan::new(suite, platform, args.seed);
     let machine = Machine::here(gpu.map_or_else(|| missing.to_owned(), Gpu::describe), gpu.map(Gpu::is_software));
-    let bar = bar();
-    let record = run::run(&plan, &Cpu, gpu.map(|g| g as &dyn Renderer), machine, folder, &bar)?;
-    bar.0.finish_and_clear();
-    Ok(record)
+    let prepared = Prepared::new(&plan)?;
+    let folder = RecordFolder::create(&args.out)?;
+    let record = prepared.run(&Cpu, gpu.map(|g| g as &dyn Renderer), machine, &folder, &bar())?;
+    Ok((record, folder))
 }
 
 /// The GPU, or why there is none.
 fn open(choice: Choice) -> Result<(Option<Gpu>, String), Failure> {
     match choice {
-        Choice::Cpu => Ok((None, "not asked for".to_owned())),
+        Choice::Cpu => Ok((None, "not asked for (--renderer cpu)".to_owned())),
         Choice::Gpu => Gpu::open().map(|g| (Some(g), String::new())).map_err(|e| Failure::usage(e.to_string())),
         Choice::Auto => Ok(match Gpu::open() {
             Ok(gpu) => (Some(gpu), String::new()),

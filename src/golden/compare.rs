@@ -11,6 +11,14 @@ use serde::Serialize;
 /// pass), the whole image no place; 16 x 16 tiles at 16 replicates see .023.
 pub const TILE: u32 = 16;
 
+/// A tile's bias that must be found with probability .8, or a comparison says
+/// nothing.
+pub const MUST_SEE: f64 = 0.05;
+
+/// Rays that may be decided differently where the random numbers are the same: a
+/// share of all. It is what the GPU is allowed against the CPU.
+const SAME_RAYS: f64 = 1e-4;
+
 /// A test of one tile, or of the whole image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Tile {
@@ -30,8 +38,15 @@ pub struct Tile {
 pub enum Finding {
     /// The same pixels to the last bit.
     Identical,
-    /// No test rejects: the image may be another sample of the golden.
+    /// No test rejects: the image may be another sample of the golden. With the
+    /// golden's own seeds: hardly a ray is decided differently.
     Equal,
+    /// The random numbers are the golden's, but more rays than rounding can
+    /// explain are decided differently.
+    Rays {
+        /// Their share, at least.
+        share: f64,
+    },
     /// The tests that reject, the surest first.
     Shifted(Vec<Tile>),
     /// Pixels that hold a number on one side only: geometry moved, or NaN.
@@ -63,13 +78,22 @@ impl Comparison {
         matches!(self.finding, Finding::Identical | Finding::Equal)
     }
 
+    /// Whether it finds nothing because it could see nothing.
+    pub fn is_blind(&self) -> bool {
+        self.finding == Finding::Equal && !self.same_seeds && self.detectable >= MUST_SEE
+    }
+
     /// One line for people.
     pub fn line(&self) -> String {
         let seeds = if self.same_seeds { "same seeds" } else { "fresh seeds" };
         let sees = format!("would see a bias of {:.4} in a tile", self.detectable);
         match &self.finding {
             Finding::Identical => format!("identical  {seeds}"),
+            Finding::Equal if self.is_blind() => format!("BLIND      {seeds}; {sees}, {MUST_SEE} is wanted"),
             Finding::Equal => format!("equal      {seeds}; mean bias {:+.5}; {sees}", self.bias),
+            Finding::Rays { share } => {
+                format!("DIFFERENT  {seeds}, but {:.3} % of the rays or more are decided differently", share * 100.0)
+            }
             Finding::Structure { pixels } => {
                 format!("DIFFERENT  {pixels} pixels hold a number in one image only")
             }
@@ -86,7 +110,8 @@ impl Comparison {
 
 /// Compares an image with its golden, both of the same resolution.
 ///
-/// The exact hash comes first. Then Welch's test, with both variances, on every
+/// The exact hash comes first, where the golden's seeds were used; if it differs,
+/// no more than 1 ray in 10,000 may. With fresh seeds, Welch's test, with both variances, on every
 /// 16 x 16 tile and on the whole image: the variance of a mean over pixels is the
 /// sum of the pixels' variances over (pixels^2 x replicates), because pixels have
 /// random numbers of their own. Tiles without any noise would reject on one ray,
@@ -104,7 +129,7 @@ pub fn compare(golden: &Sampled, image: &Sampled, alpha: f64, family: usize) -> 
         .collect();
     let level = sidak_alpha(alpha, tiles.len() * family.max(1));
     let tests: Vec<(Tile, f64)> = tiles.iter().filter_map(|&place| test(golden, image, place)).collect();
-    let mut rejected: Vec<Tile> = tests.iter().map(|(t, _)| *t).filter(|t| t.p < level).collect();
+    let mut rejected: Vec<Tile> = tests.iter().map(|(t, _)| *t).filter(|t| t.p < level || t.p.is_nan()).collect();
     rejected.sort_by(|a, b| a.p.total_cmp(&b.p));
     let mut detectable: Vec<f64> = tests
         .iter()
@@ -116,6 +141,9 @@ pub fn compare(golden: &Sampled, image: &Sampled, alpha: f64, family: usize) -> 
         Finding::Identical
     } else if structure > 0 {
         Finding::Structure { pixels: structure }
+    } else if same_seeds {
+        let share = rays_moved(golden, image);
+        if share <= SAME_RAYS { Finding::Equal } else { Finding::Rays { share } }
     } else if rejected.is_empty() {
         Finding::Equal
     } else {
@@ -128,6 +156,13 @@ pub fn compare(golden: &Sampled, image: &Sampled, alpha: f64, family: usize) -> 
         detectable: detectable.get(detectable.len() / 2).copied().unwrap_or(0.0),
         tests: tests.len(),
     }
+}
+
+/// The least share of rays that explains the difference of the means.
+fn rays_moved(golden: &Sampled, image: &Sampled) -> f64 {
+    let pairs = || golden.mean.iter().zip(&image.mean).filter(|(a, b)| a.is_finite() && b.is_finite());
+    let moved: f64 = pairs().map(|(a, b)| f64::from((a - b).abs())).sum();
+    moved / pairs().count() as f64
 }
 
 /// Mean, variance of that mean and its degrees of freedom over a rectangle; None
@@ -216,6 +251,19 @@ mod tests {
         let mut holed = sample(2, 0.0);
         holed.mean[5] = f32::NAN;
         assert_eq!(compare(&golden, &holed, 0.01, 1).finding, Finding::Structure { pixels: 1 });
+    }
+
+    #[test]
+    fn with_the_same_seeds_a_shift_is_no_noise() {
+        let golden = sample(1, 0.0);
+        let mut image = golden.clone();
+        for v in &mut image.mean {
+            *v += 0.001;
+        }
+        assert!(matches!(compare(&golden, &image, 0.01, 1).finding, Finding::Rays { .. }));
+        image = golden.clone();
+        image.mean[7] -= 2.0 / (16.0 * 32.0);
+        assert_eq!(compare(&golden, &image, 0.01, 1).finding, Finding::Equal);
     }
 
     #[test]

@@ -46,6 +46,8 @@ pub struct Golden {
     pub image: Sampled,
     /// Content hash of the scene it was taken of.
     pub scene_hash: String,
+    /// What its estimator computes.
+    pub definition: String,
     /// Why it was accepted.
     pub reason: String,
 }
@@ -64,8 +66,8 @@ pub enum Verdict {
     Missing,
     /// The golden cannot be used: it is broken, or of another scene or setting.
     Unusable(String),
-    /// The record's own image cannot be read.
-    Unreadable(String),
+    /// The case ended with an error, or the record's own image cannot be read.
+    Lost(String),
     /// Golden and image were compared.
     Compared(Comparison),
 }
@@ -88,15 +90,21 @@ pub enum Outcome {
     Pass,
     /// An image differs from its golden.
     Fail,
+    /// Nothing differs, but a difference that matters could not have been seen.
+    Blind,
     /// A golden is missing or unusable.
     Missing,
+    /// The record has no image to compare.
+    Lost,
 }
 
 impl Checked {
     /// The kind of end.
     pub fn outcome(&self) -> Outcome {
         match &self.verdict {
-            Verdict::Missing | Verdict::Unusable(_) | Verdict::Unreadable(_) => Outcome::Missing,
+            Verdict::Missing | Verdict::Unusable(_) => Outcome::Missing,
+            Verdict::Lost(_) => Outcome::Lost,
+            Verdict::Compared(c) if c.is_blind() => Outcome::Blind,
             Verdict::Compared(c) if c.passes() => Outcome::Pass,
             Verdict::Compared(_) => Outcome::Fail,
         }
@@ -106,16 +114,22 @@ impl Checked {
     pub fn line(&self) -> String {
         let text = match &self.verdict {
             Verdict::Missing => format!("MISSING    there is no {}", self.golden.display()),
-            Verdict::Unusable(why) | Verdict::Unreadable(why) => format!("UNUSABLE   {why}"),
+            Verdict::Unusable(why) => format!("UNUSABLE   {why}"),
+            Verdict::Lost(why) => format!("LOST       {why}"),
             Verdict::Compared(c) => c.line(),
         };
         format!("{:<44} {text}", self.case)
     }
 }
 
-/// The cases of a record that goldens are kept of.
+/// The cases of a record that goldens are kept of, lost ones included.
 pub fn golden_cases(record: &Record) -> impl Iterator<Item = &CaseRecord> {
-    record.cases.iter().filter(|c| record.suite.golden_rays == Some(c.case.rays) && c.error.is_none())
+    record.cases.iter().filter(|c| record.suite.golden_rays == Some(c.case.rays))
+}
+
+/// What an estimator computes, as text: part of a golden's identity.
+fn definition(record: &Record, estimator: &str) -> String {
+    record.suite.methods.get(estimator).map_or_else(String::new, |m| serde_json::json!(m).to_string())
 }
 
 /// A case's image out of its record.
@@ -169,7 +183,10 @@ impl Store {
         filter: &str,
     ) -> Result<Vec<PathBuf>, DiskError> {
         let mut ready = Vec::new();
-        for case in golden_cases(record).filter(|c| c.case.renderer == "cpu" && c.case.id().contains(filter)) {
+        for case in golden_cases(record) {
+            if case.case.renderer != "cpu" || case.error.is_some() || !case.case.id().contains(filter) {
+                continue;
+            }
             let Some(scene) = record.scenes.iter().find(|s| s.name == case.case.scene) else {
                 return Err(DiskError::content(folder, format!("the record has no scene '{}'", case.case.scene)));
             };
@@ -200,7 +217,7 @@ impl Store {
                 DiskError::content(path, format!("the golden's attribute '{name}' is '{text}', no number"))
             })
         };
-        Ok(Golden {
+        let golden = Golden {
             image: Sampled {
                 resolution: layers.resolution,
                 mean: layer(&layers, path, "mean")?,
@@ -210,8 +227,19 @@ impl Store {
                 seed: number("seed")?,
             },
             scene_hash: attribute("scene-hash")?,
+            definition: attribute("definition")?,
             reason: attribute("reason")?,
-        })
+        };
+        let image = &golden.image;
+        let finite = image.mean.iter().any(|v| v.is_finite());
+        let sane = image.mean.iter().zip(&image.variance).all(|(m, v)| m.is_nan() || (v.is_finite() && *v >= 0.0));
+        if image.replicates < 2 || image.rays < 1 || !finite || !sane {
+            return Err(DiskError::content(
+                path,
+                "the golden's numbers make no sense: it needs 2 replicates or more, and finite means and variances",
+            ));
+        }
+        Ok(golden)
     }
 
     /// Compares every golden case of a record with its golden. The family error
@@ -229,6 +257,9 @@ impl Store {
     }
 
     fn check(&self, folder: &Path, record: &Record, case: &CaseRecord, path: &Path, family: usize) -> Verdict {
+        if let Some(error) = &case.error {
+            return Verdict::Lost(error.clone());
+        }
         if !path.exists() {
             return Verdict::Missing;
         }
@@ -238,13 +269,22 @@ impl Store {
         };
         let image = match sampled(folder, record, case) {
             Ok(image) => image,
-            Err(e) => return Verdict::Unreadable(e.to_string()),
+            Err(e) => return Verdict::Lost(e.to_string()),
         };
         let scene = record.scenes.iter().find(|s| s.name == case.case.scene);
         if scene.is_none_or(|s| s.hash != golden.scene_hash) {
             return Verdict::Unusable(format!(
                 "{}: the golden is of another version of the scene; approve it anew",
                 path.display()
+            ));
+        }
+        if golden.definition != definition(record, &case.case.estimator) {
+            return Verdict::Unusable(format!(
+                "{}: the golden is of {}, the record's '{}' is {}",
+                path.display(),
+                golden.definition,
+                case.case.estimator,
+                definition(record, &case.case.estimator)
             ));
         }
         if golden.image.resolution != image.resolution {
@@ -279,6 +319,7 @@ fn golden_layers(
         ("scene", scene.name.clone()),
         ("scene-hash", scene.hash.clone()),
         ("estimator", case.case.estimator.clone()),
+        ("definition", definition(record, &case.case.estimator)),
         ("rays", case.case.rays.to_string()),
         ("replicates", record.suite.replicates.to_string()),
         ("seed", record.seed.to_string()),

@@ -41,13 +41,32 @@ pub fn contrast(footprint: f64, flank: f64) -> f64 {
     footprint / flank - 1.0
 }
 
+/// The same estimator with many rays: replicates, and their mean.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Converged {
+    /// Independent images, at least two.
+    pub replicates: Vec<Vec<f32>>,
+    /// Their mean a pixel.
+    pub mean: Vec<f32>,
+}
+
+impl Converged {
+    /// Averages replicates of one size.
+    pub fn new(replicates: Vec<Vec<f32>>) -> Self {
+        let pixels = replicates.first().map_or(0, Vec::len);
+        let n = replicates.len() as f64;
+        let mean = (0..pixels).map(|i| (replicates.iter().map(|r| f64::from(r[i])).sum::<f64>() / n) as f32).collect();
+        Converged { replicates, mean }
+    }
+}
+
 /// One method's images in one scene: replicates, and its converged image.
 #[derive(Clone, Copy, Debug)]
 pub struct Method<'a> {
     /// One openness image a replicate.
     pub replicates: &'a [Vec<f32>],
     /// The same estimator with many rays.
-    pub converged: &'a [f32],
+    pub converged: &'a Converged,
     /// Where to look.
     pub regions: &'a Regions,
 }
@@ -58,7 +77,7 @@ impl Method<'_> {
     /// # Errors
     /// Where a flank is too small.
     pub fn brighter(&self) -> Result<Brighter, Absent> {
-        let mean = |region| self.regions.mean(region, self.converged);
+        let mean = |region| self.regions.mean(region, &self.converged.mean);
         Ok(Brighter::of(mean(Region::Left)?, mean(Region::Right)?))
     }
 
@@ -87,7 +106,7 @@ impl Method<'_> {
                 contrast(m[0][0], m[0][1]) - contrast_of_means(&m[1], judge.brighter)
             }))
         });
-        let reading = estimate.as_ref().ok().zip(judge.ok()).and_then(|(e, j)| reading(e, j.contrast().value?));
+        let reading = estimate.as_ref().ok().zip(judge.ok()).and_then(|(e, j)| reading(e, j.contrast().value));
         let mut metric = Metric::new(MetricName::ContrastError, None, estimate);
         if metric.value.is_some() {
             metric.note = reading.map(str::to_owned);

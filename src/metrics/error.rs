@@ -32,19 +32,26 @@ pub fn openness(method: &Method<'_>) -> Vec<Metric> {
 /// Bias, MAE and RMSE of the replicates against the converged image.
 ///
 /// MAE and RMSE are those of one replicate, so they hold its noise and fall with
-/// the ray count; bias does not.
+/// the ray count; bias does not. The interval of the bias holds the noise of the
+/// converged image too, which is a mean of replicates of its own.
 pub fn against_converged(method: &Method<'_>, region: Region) -> [Metric; 3] {
-    let pixels = method.regions.measurable(region);
+    let regions = method.regions;
     let of = |f: fn(f64) -> f64, finish: fn(f64) -> f64| {
-        let pixels = pixels.clone()?;
+        let pixels = regions.measurable(region)?;
         over_replicates(method.replicates, |_, image| {
-            let sum: f64 =
-                pixels.iter().map(|&i| f(f64::from(image[i as usize]) - f64::from(method.converged[i as usize]))).sum();
+            let sum: f64 = pixels
+                .iter()
+                .map(|&i| f(f64::from(image[i as usize]) - f64::from(method.converged.mean[i as usize])))
+                .sum();
             Ok(finish(sum / pixels.len() as f64))
         })
     };
+    let bias = over_replicates(method.replicates, |_, image| regions.mean(region, image)).and_then(|own| {
+        let converged = over_replicates(&method.converged.replicates, |_, image| regions.mean(region, image))?;
+        Ok(own.less(&converged))
+    });
     [
-        Metric::new(MetricName::Bias, Some(region), of(|d| d, |m| m)),
+        Metric::new(MetricName::Bias, Some(region), bias),
         Metric::new(MetricName::Mae, Some(region), of(f64::abs, |m| m)),
         Metric::new(MetricName::Rmse, Some(region), of(|d| d * d, f64::sqrt)),
     ]
@@ -61,10 +68,7 @@ pub fn against_judge(method: &Method<'_>, judge: Result<&Judge, Absent>, region:
 fn judge_bias(method: &Method<'_>, judge: &Judge, region: Region) -> Result<Estimate, Absent> {
     let q = judge.q_of(region).ok_or_else(|| Absent("the judge has no such region".into()))?;
     let o = over_replicates(method.replicates, |_, image| method.regions.mean(region, image))?;
-    let variance = o.se * o.se + q.se * q.se;
-    let welch = o.se.powi(4) / o.df + q.se.powi(4) / q.df;
-    let df = if welch > 0.0 { variance * variance / welch } else { 1.0 };
-    Ok(Estimate { value: o.value - q.value, se: variance.sqrt(), df })
+    Ok(o.less(&q))
 }
 
 fn judge_rmse(method: &Method<'_>, judge: &Judge, region: Region) -> Result<Estimate, Absent> {
@@ -89,9 +93,25 @@ pub fn renderer_difference(own: &[Vec<f32>], cpu: &[Vec<f32>], regions: &Regions
     Metric::new(MetricName::RendererDifference, None, difference(own, cpu, regions))
 }
 
+/// Pixels that may hold a number in one image only before a difference means
+/// nothing: a share of all.
+const APART: f64 = 1e-3;
+
 fn difference(a: &[Vec<f32>], b: &[Vec<f32>], regions: &Regions) -> Result<Estimate, Absent> {
     if a.len() != b.len() {
         return Err(Absent("the two have different numbers of replicates".into()));
     }
-    over_replicates(a, |r, image| Ok(regions.mean(Region::All, image)? - regions.mean(Region::All, &b[r])?))
+    let pixels = regions.measurable(Region::All)?;
+    over_replicates(a, |r, image| {
+        let differences: Vec<f64> = pixels
+            .iter()
+            .map(|&i| f64::from(image[i as usize]) - f64::from(b[r][i as usize]))
+            .filter(|d| d.is_finite())
+            .collect();
+        let apart = pixels.len() - differences.len();
+        if apart as f64 > APART * pixels.len() as f64 {
+            return Err(Absent(format!("{apart} of {} pixels see a surface in one image only", pixels.len())));
+        }
+        Ok(differences.iter().sum::<f64>() / differences.len() as f64)
+    })
 }

@@ -3,7 +3,7 @@
 //! with the same random numbers.
 
 use super::{
-    Absent, Metric, MetricName,
+    Absent,
     artifact::{Brighter, contrast},
     regions::{Region, Regions},
 };
@@ -100,11 +100,14 @@ impl Judge {
     }
 
     /// The widest 95 % interval among the regions' irradiances and ratios, as
-    /// half width over value.
+    /// half width over value; infinite where one is not known.
     pub fn widest(&self) -> f64 {
         let half = |e: Estimate| {
             let [lo, hi] = e.interval(0.95);
-            (hi - lo) / 2.0 / e.value
+            let half = (hi - lo) / 2.0;
+            // Exactly nothing, as under a sealed occluder, is exactly known.
+            let relative = if half == 0.0 { 0.0 } else { half / e.value };
+            if relative.is_nan() { f64::INFINITY } else { relative }
         };
         (0..6)
             .map(|c| half(jackknife(std::slice::from_ref(&self.means), |m| m[0][c])))
@@ -112,10 +115,15 @@ impl Judge {
             .fold(0.0, f64::max)
     }
 
+    /// Whether light reaches every region of the twin: without it Q is not
+    /// defined.
+    pub fn has_light(&self) -> bool {
+        (3..6).all(|column| self.means.iter().any(|row| row[column] > 0.0))
+    }
+
     /// K(Q).
-    pub fn contrast(&self) -> Metric {
-        let k = jackknife(std::slice::from_ref(&self.means), |m| contrast_of_means(&m[0], self.brighter));
-        Metric::new(MetricName::JudgeContrast, None, Ok(k))
+    pub fn contrast(&self) -> Estimate {
+        jackknife(std::slice::from_ref(&self.means), |m| contrast_of_means(&m[0], self.brighter))
     }
 
     /// Whether a pixel of Q is too noisy to show.

@@ -97,7 +97,11 @@ impl Metric {
                 let finite = |v: f64| v.is_finite().then_some(v);
                 Metric { name, region, value: Some(e.value), se: finite(e.se), df: finite(e.df), note: None }
             }
-            Ok(_) => Self::absent(name, region, "a denominator is zero"),
+            Ok(_) => Self::absent(
+                name,
+                region,
+                "the value is not a finite number: an image holds NaN, or a denominator is zero",
+            ),
             Err(Absent(why)) => Self::absent(name, region, &why),
         }
     }

@@ -4,7 +4,7 @@
 use super::Absent;
 use crate::{
     render::gbuffer::{GBuffer, Surface},
-    trace::{TraceError, Tracer},
+    trace::Tracer,
 };
 use aogauge_scenes::Scene;
 use glam::{Vec2, Vec3};
@@ -65,19 +65,15 @@ pub struct Regions {
 
 impl Regions {
     /// Finds the regions of what the scene's measure view sees.
-    ///
-    /// # Errors
-    /// [`TraceError`](crate::trace::TraceError) where the occluder or the rest of
-    /// the scene makes too deep a tree.
-    pub fn new(scene: &Scene, tracer: &Tracer, gbuffer: &GBuffer) -> Result<Self, TraceError> {
+    pub fn new(scene: &Scene, tracer: &Tracer, gbuffer: &GBuffer) -> Self {
         let part = |occluder: bool| {
             let triangles: Vec<[Vec3; 3]> =
                 scene.triangles().filter(|(o, _)| scene.objects[*o].occluder == occluder).map(|(_, t)| t).collect();
             Tracer::new(&triangles)
         };
         let finder = Finder {
-            sheet: part(true)?,
-            receiver: part(false)?,
+            sheet: part(true),
+            receiver: part(false),
             scene: tracer,
             transect: scene.measure.transect,
             radius: scene.ao.radius,
@@ -89,7 +85,7 @@ impl Regions {
             .collect();
         let pixels =
             std::array::from_fn(|region| (0..found.len() as u32).filter(|&i| found[i as usize][region]).collect());
-        Ok(Regions { pixels })
+        Regions { pixels }
     }
 
     /// The pixels of a region, in order.
@@ -149,7 +145,9 @@ impl Finder<'_> {
         if let Some(to) = self.to_shadow(s) {
             let distance = to.length() / self.radius;
             member[Region::Footprint as usize] = distance <= FOOTPRINT_MARGIN + ROUNDING;
-            if (FLANK[0] - ROUNDING..=FLANK[1] + ROUNDING).contains(&distance) {
+            // Beside the sheet, not beyond its end.
+            let beside = to.x.abs() > to.y.abs();
+            if beside && (FLANK[0] - ROUNDING..=FLANK[1] + ROUNDING).contains(&distance) {
                 let side = if to.x > 0.0 { Region::Left } else { Region::Right };
                 member[side as usize] = true;
             }
@@ -285,7 +283,7 @@ mod tests {
         let scene = library::scene(name).unwrap();
         let geometry = Geometry::new(&scene).unwrap();
         let gbuffer = GBuffer::new(&geometry.tracer, &scene.measure.view());
-        let regions = Regions::new(&scene, &geometry.tracer, &gbuffer).unwrap();
+        let regions = Regions::new(&scene, &geometry.tracer, &gbuffer);
         (scene, gbuffer, regions)
     }
 
@@ -354,7 +352,7 @@ shape = {{ polygons = {{ positions = [[0, 0, 0.35], [0, 1, 0.35], [0, 1, 0.9], [
         let scene = Scene::from_toml("x", "x.toml", &text).unwrap();
         let geometry = Geometry::new(&scene).unwrap();
         let gbuffer = GBuffer::new(&geometry.tracer, &scene.measure.view());
-        let regions = Regions::new(&scene, &geometry.tracer, &gbuffer).unwrap();
+        let regions = Regions::new(&scene, &geometry.tracer, &gbuffer);
         let mut checked = 0;
         for (i, s) in gbuffer.surfaces.iter().enumerate() {
             let Some(s) = s else { continue };
@@ -382,6 +380,29 @@ shape = {{ polygons = {{ positions = [[0, 0, 0.35], [0, 1, 0.35], [0, 1, 0.9], [
         }
         assert!(regions.pixels(Region::Left).iter().all(|i| i % width < width / 2));
         assert!(regions.pixels(Region::Far).is_empty(), "the pillar's own edges are within R");
+    }
+
+    /// A short curtain: points beyond its ends are no flank.
+    #[test]
+    fn beyond_the_end_of_a_sheet_there_is_no_flank() {
+        let mut scene = library::scene("curtain-open").unwrap();
+        for v in &mut scene.objects[1].mesh.positions {
+            v.z *= 0.2 / 3.0;
+        }
+        scene.measure.resolution = [96, 208];
+        let geometry = Geometry::new(&scene).unwrap();
+        let gbuffer = GBuffer::new(&geometry.tracer, &scene.measure.view());
+        let regions = Regions::new(&scene, &geometry.tracer, &gbuffer);
+        for region in [Region::Left, Region::Right] {
+            let inside = |z: f32, x: f32| z.abs() <= 0.2 || z.abs() - 0.2 < x.abs() - 0.01;
+            for &i in regions.pixels(region) {
+                let p = gbuffer.surfaces[i as usize].unwrap().point;
+                assert!(inside(p.z, p.x), "{p}");
+            }
+        }
+        // Corners, where the test is a tie, may fall either way.
+        let [left, right] = [Region::Left, Region::Right].map(|r| regions.pixels(r).len());
+        assert!(left.abs_diff(right) <= 8 && left > 1200, "{left}, {right}");
     }
 
     #[test]

@@ -121,7 +121,7 @@ mod tests {
     fn plane(half: f32) -> Tracer {
         let mut mesh = aogauge_scenes::Mesh::default();
         mesh.push_quad(Vec3::new(-half, 0.0, -half), Vec3::Z * 2.0 * half, Vec3::X * 2.0 * half);
-        Tracer::new(&mesh.corners().collect::<Vec<_>>()).unwrap()
+        Tracer::new(&mesh.corners().collect::<Vec<_>>())
     }
 
     /// 1 - (k^2/2)/(1 + k^2), k = 2R'/R, where the plane counts; 1 where clipped.

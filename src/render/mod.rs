@@ -45,14 +45,13 @@ pub enum Estimator {
 pub struct Frame {
     /// Width and height in pixels.
     pub resolution: [u32; 2],
-    /// Openness in [0, 1], or irradiance over pi for the path tracer; NaN where
-    /// the view meets no surface.
+    /// Openness in [0, 1]; NaN where the view meets no surface.
     pub values: Vec<f32>,
     /// How each ray was decided, for up to 32 rays a pixel: see
     /// [`ao::Decisions`].
     pub decisions: Option<Vec<ao::Decisions>>,
-    /// The triangle that each pixel sees, as numbered in
-    /// [`Tracer::triangles`](crate::trace::Tracer::triangles); `u32::MAX` for none.
+    /// The triangle that each pixel sees, in the order of the scene; `u32::MAX`
+    /// for none.
     pub seen: Vec<u32>,
     /// Time the rays took, seconds: wall clock on the CPU, timestamp queries on
     /// the GPU (wall clock of the submission where the adapter has none).
@@ -81,29 +80,36 @@ pub struct Job<'a> {
 pub struct Geometry {
     /// The triangles.
     pub tracer: Tracer,
-    /// Diffuse albedo of each triangle, as numbered in [`Tracer::source`].
+    /// Diffuse albedo of each triangle, in the order of the scene.
     pub albedo: Vec<f32>,
     /// The light.
     pub environment: Environment,
 }
 
+/// Largest offset of ray origins that openness is still measured with, in R.
+const MAX_OFFSET: f32 = 1e-3;
+
 impl Geometry {
     /// Builds the tree of a scene.
     ///
     /// # Errors
-    /// See [`Tracer::new`].
+    /// [`RenderError::Rounding`] where the scene is so large for its R that
+    /// rounding would show.
     pub fn new(scene: &Scene) -> Result<Self, RenderError> {
         let (albedo, triangles): (Vec<f32>, Vec<_>) =
             scene.triangles().map(|(object, corners)| (scene.objects[object].material.albedo(), corners)).unzip();
-        Ok(Geometry { tracer: Tracer::new(&triangles)?, albedo, environment: scene.environment.clone() })
+        let tracer = Tracer::new(&triangles);
+        let (offset, radius) = (tracer.offset(), scene.ao.radius);
+        if offset > MAX_OFFSET * radius {
+            let magnitude = offset * 2.0f32.powi(19);
+            return Err(RenderError::Rounding { magnitude, radius, largest: MAX_OFFSET * radius * 2.0f32.powi(19) });
+        }
+        Ok(Geometry { tracer, albedo, environment: scene.environment.clone() })
     }
 }
 
 /// Who computes images. A renderer loads a scene once and renders it often.
 pub trait Renderer {
-    /// `cpu`, `gpu`, or the name of an external program.
-    fn name(&self) -> &str;
-
     /// Makes a scene ready.
     ///
     /// # Errors
@@ -123,9 +129,18 @@ pub trait Loaded {
 /// Why an image could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
-    /// The tree could not be built.
-    #[error(transparent)]
-    Trace(#[from] crate::trace::TraceError),
+    /// The scene is too large for its R in 32-bit floats.
+    #[error(
+        "coordinates reach {magnitude} m, but with ao.radius = {radius} m they must stay below {largest} m: beyond, rounding errors would show in openness"
+    )]
+    Rounding {
+        /// The largest coordinate, metres.
+        magnitude: f32,
+        /// R, metres.
+        radius: f32,
+        /// The largest coordinate allowed, metres.
+        largest: f32,
+    },
     /// A GPU was asked for by name and there is none.
     #[error("no GPU adapter was found: {0}")]
     NoAdapter(String),

@@ -137,7 +137,7 @@ mod tests {
         let text = format!(
             r#"
 description = "test"
-ao = {{ radius = 0.25 }}
+ao = {{ radius = 20 }}
 environment = {{ radiance = 2.0, portals = [{portals}] }}
 measure = {{ center = [0, 0, 0], normal = [0, 1, 0], transect = [1, 0, 0], clearance = 0.1, resolution = [16, 16] }}
 look = {{ eye = [1, 1, 1], target = [0, 0, 0], resolution = [16, 16] }}

@@ -44,6 +44,7 @@ struct SceneSection {
     radius: f64,
     secondary_radius: f64,
     judge: Option<String>,
+    no_judge: Option<String>,
     estimators: Vec<String>,
     cases: Vec<CaseRow>,
     regions: String,
@@ -103,9 +104,10 @@ fn case_row(record: &Record, case: &CaseRecord, has_judge: bool) -> CaseRow {
 
 fn judge_text(scene: &SceneRecord) -> Option<String> {
     let judge = scene.judge.as_ref()?;
-    let reading = match judge.contrast.value {
-        Some(k) if k > 0.0 => "the highlight is real",
-        _ => "there is no highlight",
+    let reading = match judge.contrast.estimate().map(|e| e.interval(CONFIDENCE)) {
+        Some([lo, _]) if lo > 0.0 => "the highlight is real",
+        Some([_, hi]) if hi <= 0.0 => "there is no highlight",
+        _ => "the judge cannot tell whether there is a highlight",
     };
     let flank = match scene.brighter.get("Q") {
         Some(Brighter::Left) => "left",
@@ -114,16 +116,21 @@ fn judge_text(scene: &SceneRecord) -> Option<String> {
     let q: Vec<String> = judge
         .q
         .iter()
-        .map(|(region, [value, lo, hi])| format!("{} {}", region.label(), plus_minus(*value, [*lo, *hi])))
+        .map(|(region, q)| {
+            let text = match (q.value, q.interval) {
+                (Some(value), Some(interval)) => plus_minus(value, interval),
+                _ => "unknown".to_owned(),
+            };
+            format!("{} {text}", region.label())
+        })
         .collect();
-    let reached = if judge.precision <= judge.wanted { "" } else { ", **less precise than asked**" };
+    let precision = judge.precision.map_or_else(|| "unknown".to_owned(), |p| format!("{:.2} %", p * 100.0));
     Some(format!(
-        "K(Q) = {} against the {flank} flank: {reading}. Q: {}. {} replicates of {} paths a pixel, every region mean within {:.2} %{reached}.",
+        "K(Q) = {} against the {flank} flank: {reading}. Q: {}. {} replicates of {} paths a pixel; half width of the widest interval of a region mean: {precision}.",
         show(Some(&judge.contrast)),
         q.join(", "),
         judge.replicates,
         judge.paths,
-        judge.precision * 100.0,
     ))
 }
 
@@ -137,6 +144,7 @@ fn section(record: &Record, scene: &SceneRecord) -> SceneSection {
         radius: scene.radius,
         secondary_radius: scene.secondary_radius,
         judge: judge_text(scene),
+        no_judge: scene.no_judge.clone(),
         estimators: record.suite.estimators.clone(),
         cases: cases.iter().filter(|c| c.error.is_none()).map(|c| case_row(record, c, scene.judge.is_some())).collect(),
         regions: scene.regions.iter().map(|(r, n)| format!("{} {n}", r.label())).collect::<Vec<_>>().join(", "),
@@ -168,10 +176,10 @@ pub fn text(record: &Record) -> Result<String, minijinja::Error> {
         })
         .collect();
     let rows: Vec<Row> = table::rows(record);
-    let headline = if record.summary.fail > 0 {
-        outcome_text(Outcome::Fail)
-    } else if record.summary.failed_cases > 0 {
+    let headline = if record.summary.failed_cases > 0 {
         "INCOMPLETE"
+    } else if record.summary.fail > 0 {
+        outcome_text(Outcome::Fail)
     } else if record.summary.inconclusive > 0 {
         outcome_text(Outcome::Inconclusive)
     } else {

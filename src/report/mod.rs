@@ -2,7 +2,7 @@
 //! report can be made again from a record at any time.
 
 mod markdown;
-mod picture;
+pub(crate) mod picture;
 mod plot;
 pub mod table;
 
@@ -69,21 +69,17 @@ fn pictures(folder: &Path, record: &Record, scene: &SceneRecord, out: &Path) -> 
     };
     let look = read(&scene.look)?;
     for name in &record.suite.estimators {
-        picture::openness(
-            &layer(&look, &scene.look, name)?,
-            look.resolution,
-            1,
-            &out.join(format!("look-{name}.png")),
-        )?;
+        let values = layer(&look, &scene.look, &format!("openness-{name}"))?;
+        picture::openness(&values, look.resolution, 1, &out.join("look").join(format!("{name}.png")))?;
     }
     let traced = layer(&look, &scene.look, "path-traced")?;
-    picture::irradiance(&traced, look.resolution, &out.join("look-path-traced.png"))?;
+    picture::irradiance(&traced, look.resolution, &out.join("path-traced.png"))?;
 
     let converged = read(&scene.image)?;
     for name in &record.suite.estimators {
         let values = layer(&converged, &scene.image, &format!("converged-{name}"))?;
         let (values, size) = middle(scene, &values);
-        picture::openness(&values, size, 4, &out.join(format!("{name}.png")))?;
+        picture::openness(&values, size, 4, &out.join("measure").join(format!("{name}.png")))?;
     }
     if let Some(judge) = &scene.judge {
         let layers = read(&judge.image)?;

@@ -51,6 +51,7 @@ fn draw(scene: &SceneRecord, root: &Drawing<'_>) -> Result<(), Box<dyn std::erro
         .configure_mesh()
         .x_desc("t / R, along the transect")
         .y_desc("openness; occlusion ratio Q")
+        .x_label_formatter(&|t| format!("{:.1}", if t.abs() < 1e-9 { 0.0 } else { *t }))
         .light_line_style(WHITE)
         .bold_line_style(RGBColor(225, 225, 225))
         .label_style(("sans-serif", 14).into_font())

@@ -39,6 +39,16 @@ impl Estimate {
         Estimate { value, se: (variance / n).sqrt(), df: n - 1.0 }
     }
 
+    /// This less an independent other, with Welch and Satterthwaite's degrees of
+    /// freedom.
+    #[must_use]
+    pub fn less(&self, other: &Estimate) -> Estimate {
+        let variance = self.se * self.se + other.se * other.se;
+        let welch = self.se.powi(4) / self.df + other.se.powi(4) / other.df;
+        let df = if welch > 0.0 { variance * variance / welch } else { 1.0 };
+        Estimate { value: self.value - other.value, se: variance.sqrt(), df }
+    }
+
     /// Student's interval, `value +- t se`, at a confidence in (0, 1). A standard
     /// error of zero gives the point; an unknown one gives the whole line.
     pub fn interval(&self, confidence: f64) -> [f64; 2] {

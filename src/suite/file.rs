@@ -70,9 +70,9 @@ pub struct SuiteFile {
     /// How precise the judge must be.
     #[serde(default)]
     pub judge: JudgeSettings,
-    /// What the GPU renders where the only adapter is a software one.
-    #[serde(default)]
-    pub software_adapter: SoftwareAdapter,
+    /// What the GPU renders where the only adapter is a software one; nothing
+    /// unless given.
+    pub software_adapter: Option<SoftwareAdapter>,
     /// The methods.
     #[serde(rename = "estimator")]
     pub estimators: Vec<EstimatorFile>,
@@ -206,7 +206,8 @@ pub struct GateFile {
     /// The value is at most this.
     #[serde(default, deserialize_with = "finite")]
     pub max: Option<f64>,
-    /// The value equals this, give or take `within`.
+    /// The value equals this, give or take `within`: equivalence by TOST, which
+    /// holds where the 90 % interval lies inside.
     #[serde(default, deserialize_with = "finite")]
     pub equals: Option<f64>,
     /// The margin of `equals`.
@@ -226,6 +227,9 @@ impl GateFile {
             (None, None, Some(_), Some(_)) => return Err("within must be above 0".into()),
             _ => return Err("give exactly one limit: min, max, or equals together with within".into()),
         };
+        if self.known_failure.as_ref().is_some_and(|why| why.trim().is_empty()) {
+            return Err("known_failure must say why it fails".into());
+        }
         if matches!(self.metric, MetricName::JudgeBias | MetricName::JudgeRmse) {
             return Err(format!(
                 "{} is reported but never gated: it measures the direction of light more than AO; gate contrast-error",

@@ -133,34 +133,46 @@ impl Suite {
         if let Some(rays) = parsed.golden_rays.filter(|r| !parsed.rays.contains(r)) {
             return Err(invalid(format!("golden_rays is {}, which is not among rays", rays.get())));
         }
+        let most = parsed.rays.iter().map(|r| r.get()).max().unwrap_or(0);
+        let converged = parsed.converged_rays.get();
+        if converged < 4 * most || !converged.is_multiple_of(4) {
+            return Err(invalid(format!(
+                "converged_rays is {converged}: it must be a multiple of 4 and at least 4 times the most rays, {most}"
+            )));
+        }
         if parsed.judge.max_replicates.get() < parsed.judge.replicates.get() {
             return Err(invalid("judge.max_replicates must not be below judge.replicates".into()));
         }
         let methods = methods(&parsed).map_err(invalid)?;
         let mut gates = Vec::with_capacity(parsed.gates.len());
-        for gate in &parsed.gates {
-            let names = |list: &[String], known: &mut dyn Iterator<Item = &str>, field: &str| {
-                let known: Vec<&str> = known.collect();
-                match list.iter().find(|n| !known.contains(&n.as_str())) {
-                    Some(n) => Err(invalid(format!(
-                        "gate '{}': {field} names '{n}', which the suite does not have; it has {}",
-                        gate.name,
-                        known.join(", ")
-                    ))),
-                    None => Ok(()),
-                }
-            };
-            names(&gate.scenes, &mut scenes.iter().map(|s| s.name.as_str()), "scenes")?;
-            names(&gate.estimators, &mut methods.iter().map(|m| m.name.as_str()), "estimators")?;
-            names(&gate.renderers, &mut ["cpu", "gpu"].into_iter(), "renderers")?;
-            if let Some(r) = gate.rays.iter().find(|r| !parsed.rays.contains(r)) {
-                return Err(invalid(format!(
-                    "gate '{}': rays names {}, which the suite does not trace",
-                    gate.name,
-                    r.get()
-                )));
+        let names = |of: &str, list: &[String], known: &mut dyn Iterator<Item = &str>, field: &str| {
+            let known: Vec<&str> = known.collect();
+            match list.iter().find(|n| !known.contains(&n.as_str())) {
+                Some(n) => Err(invalid(format!(
+                    "{of}: {field} names '{n}', which the suite does not have; it has {}",
+                    known.join(", ")
+                ))),
+                None => Ok(()),
             }
-            gates.push(gate.build().map_err(|e| invalid(format!("gate '{}': {e}", gate.name)))?);
+        };
+        let traced = |of: &str, rays: &[Rays]| match rays.iter().find(|r| !parsed.rays.contains(r)) {
+            Some(r) => Err(invalid(format!("{of}: rays names {}, which the suite does not trace", r.get()))),
+            None => Ok(()),
+        };
+        if let Some(marked) = &parsed.software_adapter {
+            names("software_adapter", &marked.scenes, &mut scenes.iter().map(|s| s.name.as_str()), "scenes")?;
+            traced("software_adapter", &marked.rays)?;
+        }
+        for gate in &parsed.gates {
+            let of = format!("gate '{}'", gate.name);
+            names(&of, &gate.scenes, &mut scenes.iter().map(|s| s.name.as_str()), "scenes")?;
+            names(&of, &gate.estimators, &mut methods.iter().map(|m| m.name.as_str()), "estimators")?;
+            if parsed.gates.iter().filter(|g| g.name == gate.name).count() > 1 {
+                return Err(invalid(format!("two gates are called '{}'", gate.name)));
+            }
+            names(&of, &gate.renderers, &mut ["cpu", "gpu"].into_iter(), "renderers")?;
+            traced(&of, &gate.rays)?;
+            gates.push(gate.build().map_err(|e| invalid(format!("{of}: {e}")))?);
         }
         Ok(Suite { name: name.to_owned(), file: parsed, scenes, methods, gates })
     }

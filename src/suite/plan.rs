@@ -59,8 +59,10 @@ impl<'a> Plan<'a> {
                 }
                 for method in &suite.methods {
                     for rays in &suite.file.rays {
-                        let on_software = (marked.scenes.is_empty() || marked.scenes.contains(&scene.name))
-                            && (marked.rays.is_empty() || marked.rays.contains(rays));
+                        let on_software = marked.as_ref().is_some_and(|m| {
+                            (m.scenes.is_empty() || m.scenes.contains(&scene.name))
+                                && (m.rays.is_empty() || m.rays.contains(rays))
+                        });
                         if renderer == "gpu" && platform == Platform::SoftwareGpu && !on_software {
                             continue;
                         }

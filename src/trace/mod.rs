@@ -6,52 +6,17 @@
 //! are padded by the rounding error of the scene, so that no box hides a triangle
 //! that the triangle test would meet. The same nodes and triangles go to the GPU.
 
+mod build;
 mod triangle;
 
+pub use build::Node;
 pub use triangle::Ray;
 
-use bytemuck::{Pod, Zeroable};
+use aogauge_scenes::closest_point;
 use glam::{Vec3, Vec3A};
-use obvhs::{BvhBuildParams, bvh2::builder::build_bvh2_from_tris, triangle::Triangle};
-use std::time::Duration;
-
-/// A node of the tree, 32 bytes, the same on the CPU and the GPU.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C, align(16))]
-pub struct Node {
-    /// Smallest corner of the box, metres.
-    pub min: [f32; 3],
-    /// Inner node: index of the first of two neighbouring children. Leaf: index
-    /// of its first triangle.
-    pub first: u32,
-    /// Largest corner of the box, metres.
-    pub max: [f32; 3],
-    /// Number of triangles; 0 for an inner node.
-    pub count: u32,
-}
 
 /// The deepest tree we walk: the length of the traversal stack.
 pub const STACK: usize = 64;
-
-/// How the tree is built. Two triangles a leaf: with eight, the preset's number,
-/// AO rays in the built-in scenes took 1.2 to 1.3 times as long, because the
-/// watertight test costs more than a box. No pre-split, so that every triangle
-/// stands in the tree once.
-const BUILD: BvhBuildParams =
-    BvhBuildParams { max_prims_per_leaf: 2, collapse_traversal_cost: 1.0, ..BvhBuildParams::medium_build() };
-
-/// Why a tree could not be built.
-#[derive(Debug, thiserror::Error)]
-pub enum TraceError {
-    /// The traversal stack would overflow.
-    #[error(
-        "the BVH is {depth} levels deep, but traversal holds {STACK}: the mesh has too many triangles in one place"
-    )]
-    TooDeep {
-        /// Levels of the tree.
-        depth: usize,
-    },
-}
 
 /// The nearest triangle along a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,36 +55,15 @@ fn enter(node: &Node, origin: Vec3A, inverse: Vec3A, tmax: f32) -> f32 {
 
 impl Tracer {
     /// Builds the tree. The triangles must be finite.
-    ///
-    /// # Errors
-    /// [`TraceError::TooDeep`] on meshes with very many triangles in one place.
-    pub fn new(triangles: &[[Vec3; 3]]) -> Result<Self, TraceError> {
-        let input: Vec<Triangle> =
-            triangles.iter().map(|[a, b, c]| Triangle { v0: (*a).into(), v1: (*b).into(), v2: (*c).into() }).collect();
-        let bvh = build_bvh2_from_tris(&input, BUILD, &mut Duration::default());
+    pub fn new(triangles: &[[Vec3; 3]]) -> Self {
         let magnitude = triangles.iter().flatten().fold(0.0f32, |m, v| m.max(v.abs().max_element()));
-        let pad = magnitude * 2.0f32.powi(-22);
-        let nodes: Vec<Node> = bvh
-            .nodes
-            .iter()
-            .map(|n| Node {
-                min: (Vec3::from(n.aabb.min) - pad).to_array(),
-                first: n.first_index,
-                max: (Vec3::from(n.aabb.max) + pad).to_array(),
-                count: n.prim_count,
-            })
-            .collect();
-        let depth = depth(&nodes);
-        if depth > STACK {
-            return Err(TraceError::TooDeep { depth });
-        }
-        let source = bvh.primitive_indices;
-        Ok(Tracer {
+        let (nodes, source) = build::build(triangles, magnitude * 2.0f32.powi(-22));
+        Tracer {
             nodes,
             triangles: source.iter().map(|&i| triangles[i as usize]).collect(),
             source,
             offset: magnitude * 2.0f32.powi(-19),
-        })
+        }
     }
 
     /// The nodes; the root is the first.
@@ -148,6 +92,11 @@ impl Tracer {
     /// scaled to 1/100 would see.
     pub fn offset(&self) -> f32 {
         self.offset
+    }
+
+    /// Takes another scene's offset, so that both start rays at the same points.
+    pub fn set_offset(&mut self, offset: f32) {
+        self.offset = offset;
     }
 
     /// Whether anything lies on the ray within `(0, tmax]`.
@@ -296,55 +245,6 @@ fn box_distance_squared(node: &Node, point: Vec3) -> f32 {
     (point.clamp(Vec3::from(node.min), Vec3::from(node.max)) - point).length_squared()
 }
 
-/// Levels of the tree. Children always follow their parent's chain, so a cycle
-/// cannot occur in a tree that obvhs built.
-fn depth(nodes: &[Node]) -> usize {
-    let mut deepest = 0;
-    let mut stack = if nodes.is_empty() { vec![] } else { vec![(0u32, 1usize)] };
-    while let Some((index, level)) = stack.pop() {
-        deepest = deepest.max(level);
-        let node = &nodes[index as usize];
-        if node.count == 0 {
-            stack.extend([(node.first, level + 1), (node.first + 1, level + 1)]);
-        }
-    }
-    deepest
-}
-
-/// The point of a triangle that is nearest to `p` (Ericson, Real-Time Collision
-/// Detection, section 5.1.5).
-pub fn closest_point(p: Vec3, &[a, b, c]: &[Vec3; 3]) -> Vec3 {
-    let (ab, ac, ap) = (b - a, c - a, p - a);
-    let (d1, d2) = (ab.dot(ap), ac.dot(ap));
-    if d1 <= 0.0 && d2 <= 0.0 {
-        return a;
-    }
-    let bp = p - b;
-    let (d3, d4) = (ab.dot(bp), ac.dot(bp));
-    if d3 >= 0.0 && d4 <= d3 {
-        return b;
-    }
-    let vc = d1 * d4 - d3 * d2;
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        return a + ab * (d1 / (d1 - d3));
-    }
-    let cp = p - c;
-    let (d5, d6) = (ab.dot(cp), ac.dot(cp));
-    if d6 >= 0.0 && d5 <= d6 {
-        return c;
-    }
-    let vb = d5 * d2 - d1 * d6;
-    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        return a + ac * (d2 / (d2 - d6));
-    }
-    let va = d3 * d6 - d5 * d4;
-    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
-        return b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
-    }
-    let sum = va + vb + vc;
-    a + ab * (vb / sum) + ac * (vc / sum)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -380,7 +280,7 @@ mod tests {
     #[test]
     fn the_tree_agrees_with_brute_force() {
         let triangles = soup(400);
-        let tracer = Tracer::new(&triangles).unwrap();
+        let tracer = Tracer::new(&triangles);
         let mut hits = 0;
         for ray in rays(20_000, 1.5) {
             let brute = triangles
@@ -400,7 +300,7 @@ mod tests {
         let mut mesh = aogauge_scenes::Mesh::default();
         mesh.push_box(Vec3::new(-1.0, -0.7, -1.3), Vec3::new(0.9, 1.1, 1.0));
         let triangles: Vec<_> = mesh.corners().collect();
-        let tracer = Tracer::new(&triangles).unwrap();
+        let tracer = Tracer::new(&triangles);
         for (i, ray) in rays(20_000, 1.0).enumerate() {
             let inside = ray.origin.clamp(Vec3::new(-0.9, -0.6, -1.2), Vec3::new(0.8, 1.0, 0.9));
             let [a, b, _] = triangles[i % triangles.len()];
@@ -414,7 +314,7 @@ mod tests {
     #[test]
     fn nearest_agrees_with_brute_force() {
         let triangles = soup(200);
-        let tracer = Tracer::new(&triangles).unwrap();
+        let tracer = Tracer::new(&triangles);
         for ray in rays(500, 1.0) {
             let brute = triangles
                 .iter()

@@ -17,10 +17,6 @@ struct LoadedCpu<'a> {
 }
 
 impl Renderer for Cpu {
-    fn name(&self) -> &str {
-        "cpu"
-    }
-
     fn load<'a>(&'a self, geometry: &'a Geometry) -> Result<Box<dyn Loaded + 'a>, RenderError> {
         Ok(Box::new(LoadedCpu { geometry, seen: None }))
     }

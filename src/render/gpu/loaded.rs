@@ -141,15 +141,16 @@ impl<'a> LoadedGpu<'a> {
         Ok(Images { pixels, surfaces, halves, decisions, bind_group })
     }
 
-    /// Sees once, then shades in pieces, each a submission of its own. Returns
-    /// ticks spent, where the device counts them.
+    /// Sees, then shades, in pieces that are each a submission of their own. The
+    /// timer counts shading, as the CPU's clock does.
     fn dispatch(&self, job: &Job<'_>, images: &Images, timer: Option<&Timer>) {
         let pixels = images.pixels as u32;
-        let whole = self.params(job, 0..pixels, 0..job.rays);
-        self.submit(&self.gpu.see, whole, images, timer, 0);
-        for (piece, (px, rays)) in pieces(pixels, job.rays, self.budget()).into_iter().enumerate() {
+        for (px, rays) in pieces(pixels, 1, self.budget()) {
+            self.submit(&self.gpu.see, self.params(job, px, rays), images, None);
+        }
+        for (slot, (px, rays)) in (0..).zip(pieces(pixels, job.rays, self.budget())) {
             let params = self.params(job, px, rays);
-            self.submit(&self.gpu.open_halves, params, images, timer, piece as u64 + 1);
+            self.submit(&self.gpu.open_halves, params, images, timer.map(|t| (t, slot)));
         }
     }
 
@@ -185,20 +186,13 @@ impl<'a> LoadedGpu<'a> {
         }
     }
 
-    fn submit(
-        &self,
-        pipeline: &wgpu::ComputePipeline,
-        params: Params,
-        images: &Images,
-        timer: Option<&Timer>,
-        slot: u64,
-    ) {
+    fn submit(&self, pipeline: &wgpu::ComputePipeline, params: Params, images: &Images, timer: Option<(&Timer, u64)>) {
         self.gpu.queue.write_buffer(&self.params, 0, bytemuck::bytes_of(&params));
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                 label: None,
-                timestamp_writes: timer.map(|t| wgpu::ComputePassTimestampWrites {
+                timestamp_writes: timer.map(|(t, _)| wgpu::ComputePassTimestampWrites {
                     query_set: &t.queries,
                     beginning_of_pass_write_index: Some(0),
                     end_of_pass_write_index: Some(1),
@@ -208,7 +202,7 @@ impl<'a> LoadedGpu<'a> {
             pass.set_bind_group(0, &images.bind_group, &[]);
             pass.dispatch_workgroups(params.pixels.div_ceil(WORKGROUP), 1, 1);
         }
-        if let Some(t) = timer {
+        if let Some((t, slot)) = timer {
             encoder.resolve_query_set(&t.queries, 0..2, &t.resolved, 0);
             encoder.copy_buffer_to_buffer(&t.resolved, 0, &t.ticks, slot * TICKS, TICKS);
         }
@@ -288,7 +282,7 @@ impl Loaded for LoadedGpu<'_> {
         };
         let start = Instant::now();
         let frame = guarded(self.gpu, || {
-            let dispatches = 1 + pieces(pixels as u32, job.rays, self.budget()).len() as u64;
+            let dispatches = pieces(pixels as u32, job.rays, self.budget()).len() as u64;
             let timer = self.gpu.tick.map(|_| Timer::new(self.gpu, dispatches));
             self.dispatch(job, &images, timer.as_ref());
             let halves: Vec<u32> = self.read(&images.halves)?;

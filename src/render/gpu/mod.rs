@@ -164,10 +164,6 @@ fn bindings(device: &wgpu::Device) -> wgpu::BindGroupLayout {
 }
 
 impl Renderer for Gpu {
-    fn name(&self) -> &str {
-        "gpu"
-    }
-
     fn load<'a>(&'a self, geometry: &'a Geometry) -> Result<Box<dyn Loaded + 'a>, RenderError> {
         Ok(Box::new(LoadedGpu::new(self, geometry)?))
     }

@@ -1,20 +1,15 @@
-//! `aogauge scene`
+//! `aogauge scene list`
 
-use super::{Exit, Failure, Format, json, print};
-use crate::scenes::library;
-use clap::{Args, Subcommand};
+use crate::{
+    cli::{Exit, Failure, Format, json, print},
+    scenes::library,
+};
 use serde::Serialize;
 
-/// Look at the built-in scenes.
-#[derive(Debug, Subcommand)]
-pub enum Verb {
-    List(List),
-}
-
 /// List the built-in scenes.
-#[derive(Debug, Args)]
+#[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  aogauge scene list --format json")]
-pub struct List {
+pub struct Args {
     /// How the list is printed.
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -29,8 +24,7 @@ struct Entry {
     description: String,
 }
 
-pub fn execute(verb: &Verb) -> Result<Exit, Failure> {
-    let Verb::List(args) = verb;
+pub fn execute(args: &Args) -> Result<Exit, Failure> {
     let mut entries = Vec::new();
     for (name, _) in library::SCENES {
         let scene = library::scene(name)?;
