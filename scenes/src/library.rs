@@ -3,7 +3,7 @@
 use crate::{Scene, SceneError};
 
 /// Name and TOML text of every built-in scene, in the order they are shown.
-pub const SCENES: [(&str, &str); 7] = [
+pub const SCENES: [(&str, &str); 8] = [
     ("curtain-open", include_str!("../library/curtain-open.toml")),
     ("curtain-arcade", include_str!("../library/curtain-arcade.toml")),
     ("curtain-room", include_str!("../library/curtain-room.toml")),
@@ -11,6 +11,7 @@ pub const SCENES: [(&str, &str); 7] = [
     ("plane", include_str!("../library/plane.toml")),
     ("corner", include_str!("../library/corner.toml")),
     ("thick-box", include_str!("../library/thick-box.toml")),
+    ("atrium", include_str!("../library/atrium.toml")),
 ];
 
 /// The built-in scene of this name.

@@ -3,6 +3,7 @@
 //! structs hold.
 
 mod arcade;
+mod atrium;
 mod block;
 mod curtain;
 mod plane;
@@ -10,6 +11,7 @@ mod polygons;
 mod room;
 
 pub use arcade::Arcade;
+pub use atrium::{Atrium, Span, Whole};
 pub use block::Block;
 pub use curtain::Curtain;
 pub use plane::Plane;
@@ -32,6 +34,8 @@ pub enum Shape {
     Curtain(Curtain),
     /// A covered walk beside a courtyard.
     Arcade(Arcade),
+    /// Arcades round an open courtyard, with curtains.
+    Atrium(Atrium),
     /// A room with one window.
     Room(Room),
     /// Triangles given one by one.
@@ -68,6 +72,7 @@ impl Shape {
             Shape::Block(s) => s.mesh()?.into(),
             Shape::Curtain(s) => s.mesh().into(),
             Shape::Arcade(s) => s.mesh().into(),
+            Shape::Atrium(s) => s.parts()?,
             Shape::Room(s) => s.mesh()?.into(),
             Shape::Polygons(s) => s.mesh().into(),
         })
