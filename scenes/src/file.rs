@@ -5,6 +5,7 @@ use crate::{
     bounded::{Albedo, NonNegative, Positive, check_name},
     environment::EnvironmentFile,
     generators::Shape,
+    luminance,
     view::{LookFile, MeasureFile},
 };
 use schemars::JsonSchema;
@@ -58,7 +59,8 @@ pub(crate) struct SceneFile {
     control: bool,
     /// The scale of ambient occlusion.
     ao: AoFile,
-    /// The light.
+    /// The light; may be left out where objects with `emission` give it.
+    #[serde(default)]
     environment: EnvironmentFile,
     /// Where metrics are taken.
     measure: MeasureFile,
@@ -138,13 +140,15 @@ impl SceneFile {
         if objects.iter().all(|o| o.occluder) {
             return Err("the scene has no receiver: give at least one object that is not an occluder".into());
         }
+        // A lamp that is an occluder would leave the twin in the dark.
+        let lamps = objects.iter().any(|o| !o.occluder && luminance(o.material.emissive) > 0.0);
         let radius = self.ao.radius.0;
         Ok(Scene {
             name: name.to_owned(),
             description: self.description,
             control: self.control,
             ao: AoScale { radius, secondary_radius: self.ao.secondary_radius.map_or(radius / 4.0, |r| r.0) },
-            environment: self.environment.build()?,
+            environment: self.environment.build(lamps)?,
             measure: self.measure.build(radius)?,
             look: self.look.build()?,
             objects,

@@ -9,7 +9,7 @@ pub mod path;
 pub mod sampler;
 
 use crate::trace::Tracer;
-use aogauge_scenes::{AoScale, Environment, Scene, View};
+use aogauge_scenes::{AoScale, Environment, Scene, View, luminance};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -83,7 +83,10 @@ pub struct Geometry {
     pub tracer: Tracer,
     /// Diffuse albedo of each triangle, as numbered in [`Tracer::source`].
     pub albedo: Vec<f32>,
-    /// The light.
+    /// Luminance of the radiance each triangle sends out, from both sides;
+    /// empty where none does.
+    pub emission: Vec<f32>,
+    /// The distant light.
     pub environment: Environment,
 }
 
@@ -95,7 +98,17 @@ impl Geometry {
     pub fn new(scene: &Scene) -> Result<Self, RenderError> {
         let (albedo, triangles): (Vec<f32>, Vec<_>) =
             scene.triangles().map(|(object, corners)| (scene.objects[object].material.albedo(), corners)).unzip();
-        Ok(Geometry { tracer: Tracer::new(&triangles)?, albedo, environment: scene.environment.clone() })
+        let mut emission: Vec<f32> =
+            scene.triangles().map(|(object, _)| luminance(scene.objects[object].material.emissive)).collect();
+        if emission.iter().all(|&e| e <= 0.0) {
+            emission.clear();
+        }
+        Ok(Geometry { tracer: Tracer::new(&triangles)?, albedo, emission, environment: scene.environment.clone() })
+    }
+
+    /// Luminance of the radiance that a triangle sends out.
+    pub fn emitted(&self, triangle: u32) -> f32 {
+        self.emission.get(triangle as usize).copied().unwrap_or(0.0)
     }
 }
 
