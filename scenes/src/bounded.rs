@@ -1,8 +1,9 @@
 //! Numbers that know their range. Each checks itself while it is read, so that
 //! the TOML reader reports a bad value with its line and column.
 
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
+use std::{borrow::Cow, fmt::Display};
 
 /// A finite number, as f32.
 fn finite<'de, D: Deserializer<'de>>(d: D) -> Result<f32, D::Error> {
@@ -58,6 +59,154 @@ bounded!(
     "from 0 up to, but not including, 1",
     "minimum" = 0
 );
+
+/// The complaint about a number outside its range.
+fn out_of_range<E: Error>(value: impl Display, range: impl Display) -> E {
+    E::custom(format!("{value} is out of range: it must be {range}"))
+}
+
+/// Ranges that a parameter carries in its type, so that the declaration is the
+/// documentation. `$unit` is what one step of the bounds is worth.
+macro_rules! ranged {
+    ($(#[$doc:meta])* $name:ident, $bound:ty, $unit:literal, $suffix:literal) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+        #[serde(transparent)]
+        pub struct $name<const MIN: $bound, const MAX: $bound>(pub f32);
+
+        impl<'de, const MIN: $bound, const MAX: $bound> Deserialize<'de> for $name<MIN, MAX> {
+            fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+                let value = finite(d)?;
+                let (min, max) = (MIN as f32 / $unit, MAX as f32 / $unit);
+                if (min..=max).contains(&value) {
+                    Ok(Self(value))
+                } else {
+                    Err(out_of_range(value, format_args!("from {min} to {max}{}", $suffix)))
+                }
+            }
+        }
+
+        impl<const MIN: $bound, const MAX: $bound> JsonSchema for $name<MIN, MAX> {
+            fn inline_schema() -> bool {
+                true
+            }
+
+            fn schema_name() -> Cow<'static, str> {
+                stringify!($name).into()
+            }
+
+            fn json_schema(_: &mut SchemaGenerator) -> Schema {
+                json_schema!({
+                    "type": "number",
+                    "minimum": f64::from(MIN) / f64::from($unit),
+                    "maximum": f64::from(MAX) / f64::from($unit)
+                })
+            }
+        }
+    };
+}
+
+ranged!(
+    /// A length in metres; its bounds are in millimetres.
+    Length,
+    u32,
+    1000.0f32,
+    " m"
+);
+ranged!(
+    /// An angle in degrees.
+    Angle,
+    i32,
+    1.0f32,
+    " degrees"
+);
+
+/// A whole number between two bounds: what a shape makes so many of is always
+/// capped, so that no parameter allocates without bound.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub struct Count<const MIN: u32, const MAX: u32>(pub u32);
+
+impl<'de, const MIN: u32, const MAX: u32> Deserialize<'de> for Count<MIN, MAX> {
+    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        let value = i64::deserialize(d)?;
+        u32::try_from(value)
+            .ok()
+            .filter(|v| (MIN..=MAX).contains(v))
+            .map(Self)
+            .ok_or_else(|| out_of_range(value, format_args!("a whole number from {MIN} to {MAX}")))
+    }
+}
+
+impl<const MIN: u32, const MAX: u32> JsonSchema for Count<MIN, MAX> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Count".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "integer", "minimum": MIN, "maximum": MAX })
+    }
+}
+
+/// How thick a sheet is, metres: 0 is a single, open layer of triangles; what is
+/// thicker is a closed solid.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(transparent)]
+pub struct Thickness(pub f32);
+
+impl Thickness {
+    /// The thinnest solid, metres: below it the two faces fall together in 32-bit
+    /// coordinates.
+    const MIN: f32 = 1e-4;
+    /// The thickest, metres.
+    const MAX: f32 = 100.0;
+}
+
+impl<'de> Deserialize<'de> for Thickness {
+    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        let value = finite(d)?;
+        if value == 0.0 || (Self::MIN..=Self::MAX).contains(&value) {
+            return Ok(Self(value));
+        }
+        Err(out_of_range(value, format_args!("0, for a single sheet, or from {} to {} m", Self::MIN, Self::MAX)))
+    }
+}
+
+impl JsonSchema for Thickness {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Thickness".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "number", "anyOf": [{ "const": 0 }, { "minimum": 1e-4, "maximum": Self::MAX }] })
+    }
+}
+
+ranged!(
+    /// A signed distance in metres; so are its bounds.
+    Offset,
+    i32,
+    1.0f32,
+    " m"
+);
+
+/// A coordinate of a place: near enough to the origin that a tenth of a
+/// millimetre still counts in 32-bit numbers.
+pub type Coordinate = Offset<-100, 100>;
+
+impl Default for Coordinate {
+    fn default() -> Self {
+        Self(0.0)
+    }
+}
 
 /// A point or vector of finite coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]

@@ -6,6 +6,7 @@ use crate::{
     derive,
     environment::EnvironmentFile,
     generators::Shape,
+    luminance,
     view::{LookFile, MeasureFile},
 };
 use schemars::JsonSchema;
@@ -59,7 +60,8 @@ pub(crate) struct SceneFile {
     control: bool,
     /// The scale of ambient occlusion.
     ao: AoFile,
-    /// The light.
+    /// The light; may be left out where objects with `emission` give it.
+    #[serde(default)]
     environment: EnvironmentFile,
     /// Where metrics are taken; found from the occluder and what it stands over
     /// unless given.
@@ -141,6 +143,8 @@ impl SceneFile {
         if objects.iter().all(|o| o.occluder) {
             return Err("the scene has no receiver: give at least one object that is not an occluder".into());
         }
+        // A lamp that is an occluder would leave the twin in the dark.
+        let lamps = objects.iter().any(|o| !o.occluder && luminance(o.material.emissive) > 0.0);
         let radius = self.ao.radius.0;
         let measure = match &self.measure {
             Some(given) => given.build(radius)?,
@@ -155,7 +159,7 @@ impl SceneFile {
             description: self.description,
             control: self.control,
             ao: AoScale { radius, secondary_radius: self.ao.secondary_radius.map_or(radius / 4.0, |r| r.0) },
-            environment: self.environment.build()?,
+            environment: self.environment.build(lamps)?,
             measure,
             look,
             objects,

@@ -21,7 +21,7 @@ mod scene;
 mod view;
 
 pub use bounded::check_name;
-pub use environment::{Environment, Portal};
+pub use environment::{Environment, Portal, Sky};
 pub use file::SceneError;
 pub use material::{MAX_ALBEDO, Material, Texture, luminance};
 pub use mesh::{Mesh, MeshError, closest_point};

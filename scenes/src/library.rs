@@ -3,7 +3,7 @@
 use crate::{Scene, SceneError};
 
 /// Name and TOML text of every built-in scene, in the order they are shown.
-pub const SCENES: [(&str, &str); 8] = [
+pub const SCENES: [(&str, &str); 20] = [
     ("curtain-open", include_str!("../library/curtain-open.toml")),
     ("curtain-arcade", include_str!("../library/curtain-arcade.toml")),
     ("curtain-room", include_str!("../library/curtain-room.toml")),
@@ -12,6 +12,18 @@ pub const SCENES: [(&str, &str); 8] = [
     ("corner", include_str!("../library/corner.toml")),
     ("thick-box", include_str!("../library/thick-box.toml")),
     ("atrium", include_str!("../library/atrium.toml")),
+    ("pleated-curtain", include_str!("../library/pleated-curtain.toml")),
+    ("banner", include_str!("../library/banner.toml")),
+    ("fence", include_str!("../library/fence.toml")),
+    ("blinds", include_str!("../library/blinds.toml")),
+    ("shelf", include_str!("../library/shelf.toml")),
+    ("table", include_str!("../library/table.toml")),
+    ("leaves", include_str!("../library/leaves.toml")),
+    ("cables", include_str!("../library/cables.toml")),
+    ("ceiling-light", include_str!("../library/ceiling-light.toml")),
+    ("crevice", include_str!("../library/crevice.toml")),
+    ("sphere", include_str!("../library/sphere.toml")),
+    ("ridge", include_str!("../library/ridge.toml")),
 ];
 
 /// The built-in scene of this name.

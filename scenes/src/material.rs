@@ -24,7 +24,8 @@ pub struct Material {
     pub metallic: f32,
     /// 0 mirror to 1 rough.
     pub roughness: f32,
-    /// Radiance it sends out a channel, W/(m^2 sr) up to the environment's factor.
+    /// Radiance it sends out a channel, from both sides, W/(m^2 sr) up to the
+    /// environment's factor.
     pub emissive: [f32; 3],
 }
 

@@ -1,6 +1,6 @@
 //! A scene: objects, light, scale and views.
 
-use crate::{Environment, LookView, Material, MeasureView, Mesh};
+use crate::{Environment, LookView, Material, MeasureView, Mesh, Sky};
 use glam::Vec3;
 use sha2::{Digest, Sha256};
 
@@ -76,7 +76,13 @@ impl Scene {
                 sha.update(v.to_bits().to_le_bytes());
             }
         };
-        floats(&[self.ao.radius, self.ao.secondary_radius, self.environment.radiance]);
+        floats(&[self.ao.radius, self.ao.secondary_radius]);
+        match self.environment.sky {
+            Sky::None => floats(&[0.0]),
+            Sky::Uniform(radiance) => floats(&[radiance]),
+            // Begins with what no radiance can be, to tell it from a uniform sky.
+            Sky::Gradient { zenith, horizon, ground } => floats(&[-1.0, zenith, horizon, ground]),
+        }
         for p in &self.environment.portals {
             for v in [p.corner, p.u, p.v] {
                 floats(&v.to_array());

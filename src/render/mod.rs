@@ -9,7 +9,7 @@ pub mod path;
 pub mod sampler;
 
 use crate::trace::Tracer;
-use aogauge_scenes::{AoScale, Environment, Scene, View};
+use aogauge_scenes::{AoScale, Environment, Scene, View, luminance};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -82,7 +82,10 @@ pub struct Geometry {
     pub tracer: Tracer,
     /// Diffuse albedo of each triangle, in the order of the scene.
     pub albedo: Vec<f32>,
-    /// The light.
+    /// Luminance of the radiance each triangle sends out, from both sides;
+    /// empty where none does.
+    pub emission: Vec<f32>,
+    /// The distant light.
     pub environment: Environment,
 }
 
@@ -98,13 +101,23 @@ impl Geometry {
     pub fn new(scene: &Scene) -> Result<Self, RenderError> {
         let (albedo, triangles): (Vec<f32>, Vec<_>) =
             scene.triangles().map(|(object, corners)| (scene.objects[object].material.albedo(), corners)).unzip();
+        let mut emission: Vec<f32> =
+            scene.triangles().map(|(object, _)| luminance(scene.objects[object].material.emissive)).collect();
+        if emission.iter().all(|&e| e <= 0.0) {
+            emission.clear();
+        }
         let tracer = Tracer::new(&triangles);
         let (offset, radius) = (tracer.offset(), scene.ao.radius);
         if offset > MAX_OFFSET * radius {
             let magnitude = offset * 2.0f32.powi(19);
             return Err(RenderError::Rounding { magnitude, radius, largest: MAX_OFFSET * radius * 2.0f32.powi(19) });
         }
-        Ok(Geometry { tracer, albedo, environment: scene.environment.clone() })
+        Ok(Geometry { tracer, albedo, emission, environment: scene.environment.clone() })
+    }
+
+    /// Luminance of the radiance that a triangle sends out.
+    pub fn emitted(&self, triangle: u32) -> f32 {
+        self.emission.get(triangle as usize).copied().unwrap_or(0.0)
     }
 }
 
