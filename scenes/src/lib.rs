@@ -10,19 +10,26 @@
 //! -Z forward, as in glTF.
 
 mod bounded;
+mod camera;
 mod environment;
 mod file;
 pub mod generators;
+pub mod gltf;
 pub mod library;
+mod light;
 mod material;
 mod mesh;
 mod scene;
 mod view;
+mod views_json;
 
 pub use bounded::check_name;
+pub use camera::{Camera, Projection};
 pub use environment::{Environment, Portal};
 pub use file::SceneError;
+pub use light::{Light, LightKind};
 pub use material::{MAX_ALBEDO, Material, Texture, luminance};
 pub use mesh::{Mesh, MeshError};
 pub use scene::{AoScale, Object, Scene};
 pub use view::{LookView, MeasureView, View};
+pub use views_json::views_json;
