@@ -3,6 +3,8 @@
 //! The corpus lies in `bad-gltf/`, so that other tools and the fuzzer can use it
 //! too; `AOGAUGE_WRITE_CORPUS=1 cargo test` writes it again.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "the helpers of tests are tests, too")]
+
 mod common;
 
 use aogauge_scenes::gltf::{import, import_bytes};
@@ -79,7 +81,7 @@ fn buffers() -> Vec<Bad> {
         (
             "buffer-4gb.gltf",
             changed(triangle(), |b| {
-                b.json["buffers"] = json!([{ "byteLength": 1_u64 << 32, "uri": "data:;base64,AAAA" }])
+                b.json["buffers"] = json!([{ "byteLength": 1_u64 << 32, "uri": "data:;base64,AAAA" }]);
             }),
             "says 4294967296 bytes",
         ),
@@ -105,6 +107,27 @@ fn accessors() -> Vec<Bad> {
             b.json["meshes"][0]["primitives"][0]["indices"] = a.into();
         })
     };
+    let position = |v: f32| changed(triangle(), |b| b.bin[16..20].copy_from_slice(&v.to_le_bytes()));
+    vec![
+        ("count-4g.gltf", accessor("count", json!(u32::MAX)), "accessor 0 says 4294967295 elements of 12 bytes"),
+        ("count-huge.gltf", accessor("count", json!(u64::MAX)), "accessor 0 says 18446744073709551615 elements"),
+        ("count-zero.gltf", accessor("count", json!(0)), "accessor 0 has no elements"),
+        ("count-negative.gltf", accessor("count", json!(-1)), "its JSON does not read"),
+        ("offset-huge.gltf", accessor("byteOffset", json!(u64::MAX)), "accessor 0 says 3 elements"),
+        ("offset-out.gltf", accessor("byteOffset", json!(4)), "from 4 on"),
+        ("component-unknown.gltf", accessor("componentType", json!(5124)), "unknown componentType 5124"),
+        ("component-integer.gltf", accessor("componentType", json!(5125)), "32-bit integers"),
+        ("type-wrong.gltf", accessor("type", json!("MAT4")), "is of type 'MAT4', but must be VEC3"),
+        ("view-missing.gltf", accessor("bufferView", json!(9)), "accessor 0 names bufferView 9"),
+        ("accessor-without-view.gltf", accessor("bufferView", json!(null)), "neither a bufferView nor sparse"),
+        ("index-out-of-range.gltf", indices(&[0, 1, 3]), "names vertex 3"),
+        ("index-count.gltf", indices(&[0, 1, 2, 0]), "4 indices do not make whole triangles"),
+        ("position-nan.gltf", position(f32::NAN), "vertex 1"),
+        ("position-infinite.gltf", position(f32::NEG_INFINITY), "coordinates must be finite"),
+    ]
+}
+
+fn sparse() -> Vec<Bad> {
     let sparse = |count: u64, place: u8| {
         changed(triangle(), |b| {
             let (places, values) = (b.view(&[place]), b.view(&floats(&[1.0; 3])));
@@ -123,26 +146,10 @@ fn accessors() -> Vec<Bad> {
             });
         })
     };
-    let position = |v: f32| changed(triangle(), |b| b.bin[16..20].copy_from_slice(&v.to_le_bytes()));
     vec![
-        ("count-4g.gltf", accessor("count", json!(u32::MAX)), "accessor 0 says 4294967295 elements of 12 bytes"),
-        ("count-huge.gltf", accessor("count", json!(u64::MAX)), "accessor 0 says 18446744073709551615 elements"),
-        ("count-zero.gltf", accessor("count", json!(0)), "accessor 0 has no elements"),
-        ("count-negative.gltf", accessor("count", json!(-1)), "its JSON does not read"),
-        ("offset-huge.gltf", accessor("byteOffset", json!(u64::MAX)), "accessor 0 says 3 elements"),
-        ("offset-out.gltf", accessor("byteOffset", json!(4)), "from 4 on"),
-        ("component-unknown.gltf", accessor("componentType", json!(5124)), "unknown componentType 5124"),
-        ("component-integer.gltf", accessor("componentType", json!(5125)), "32-bit integers"),
-        ("type-wrong.gltf", accessor("type", json!("MAT4")), "is of type 'MAT4', but must be VEC3"),
-        ("view-missing.gltf", accessor("bufferView", json!(9)), "accessor 0 names bufferView 9"),
-        ("accessor-without-view.gltf", accessor("bufferView", json!(null)), "neither a bufferView nor sparse"),
         ("unbacked-4g.gltf", unbacked(u64::from(u32::MAX)), "4294967295 elements without a bufferView"),
         ("sparse-count.gltf", sparse(1 << 40, 0), "the sparse part of accessor 0 says 1099511627776"),
         ("sparse-place.gltf", sparse(1, 3), "names element 3, but there are only 3"),
-        ("index-out-of-range.gltf", indices(&[0, 1, 3]), "names vertex 3"),
-        ("index-count.gltf", indices(&[0, 1, 2, 0]), "4 indices do not make whole triangles"),
-        ("position-nan.gltf", position(f32::NAN), "vertex 1"),
-        ("position-infinite.gltf", position(f32::NEG_INFINITY), "coordinates must be finite"),
     ]
 }
 
@@ -209,9 +216,30 @@ fn nodes() -> Vec<Bad> {
     ]
 }
 
+/// With one value replaced.
+fn bad(path: &str, value: serde_json::Value) -> Vec<u8> {
+    changed(everything(), |b| *b.json.pointer_mut(path).unwrap() = value)
+}
+
+fn cameras_and_lights() -> Vec<Bad> {
+    vec![
+        ("camera-flat.gltf", bad("/cameras/0/perspective/yfov", json!(0)), "camera 0: its yfov is 0"),
+        ("camera-of-no-kind.gltf", bad("/cameras/0", json!({})), "either perspective or orthographic"),
+        ("light-missing.gltf", bad("/nodes/2/extensions/KHR_lights_punctual/light", json!(9)), "names light 9"),
+        ("light-kind.gltf", bad("/extensions/KHR_lights_punctual/lights/0/type", json!("area")), "its type is 'area'"),
+        ("light-dark.gltf", bad("/extensions/KHR_lights_punctual/lights/0/intensity", json!(-1)), "must be 0 or more"),
+        (
+            "light-cone.gltf",
+            bad(
+                "/extensions/KHR_lights_punctual/lights/0",
+                json!({ "type": "spot", "spot": { "innerConeAngle": 1.0 } }),
+            ),
+            "cone angles",
+        ),
+    ]
+}
+
 fn materials() -> Vec<Bad> {
-    let bad =
-        |path: &str, value: serde_json::Value| changed(everything(), |b| *b.json.pointer_mut(path).unwrap() = value);
     let mut bomb = common::png();
     // The size stands in the header, with a checksum after it.
     bomb[16..24].copy_from_slice(&[0, 0, 0x40, 0, 0, 0, 0x40, 0]);
@@ -255,19 +283,6 @@ fn materials() -> Vec<Bad> {
             }),
             "texture coordinate 0 is not a finite number",
         ),
-        ("camera-flat.gltf", bad("/cameras/0/perspective/yfov", json!(0)), "camera 0: its yfov is 0"),
-        ("camera-of-no-kind.gltf", bad("/cameras/0", json!({})), "either perspective or orthographic"),
-        ("light-missing.gltf", bad("/nodes/2/extensions/KHR_lights_punctual/light", json!(9)), "names light 9"),
-        ("light-kind.gltf", bad("/extensions/KHR_lights_punctual/lights/0/type", json!("area")), "its type is 'area'"),
-        ("light-dark.gltf", bad("/extensions/KHR_lights_punctual/lights/0/intensity", json!(-1)), "must be 0 or more"),
-        (
-            "light-cone.gltf",
-            bad(
-                "/extensions/KHR_lights_punctual/lights/0",
-                json!({ "type": "spot", "spot": { "innerConeAngle": 1.0 } }),
-            ),
-            "cone angles",
-        ),
     ]
 }
 
@@ -279,7 +294,7 @@ fn crc32(bytes: &[u8]) -> u32 {
 }
 
 fn corpus() -> Vec<Bad> {
-    [containers(), buffers(), accessors(), nodes(), materials()].concat()
+    [containers(), buffers(), accessors(), sparse(), nodes(), materials(), cameras_and_lights()].concat()
 }
 
 fn folder() -> PathBuf {

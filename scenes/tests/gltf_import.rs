@@ -1,5 +1,7 @@
 //! What glTF may say, and what is made of it.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "the helpers of tests are tests, too")]
+
 mod common;
 
 use aogauge_scenes::{LightKind, Projection, Scene, gltf::import_bytes};

@@ -1,5 +1,7 @@
 //! What is written reads back the same.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "the helpers of tests are tests, too")]
+
 use aogauge_scenes::{
     Camera, Light, LightKind, Material, Projection, Scene, Texture,
     gltf::{Imported, import_bytes, write_glb},

@@ -1,4 +1,5 @@
 //! Small glTF files for tests, put together by hand.
+#![allow(clippy::unwrap_used, clippy::needless_pass_by_value, reason = "short calls count for more in tests")]
 #![allow(dead_code, reason = "every test file uses its own part")]
 
 use aogauge_scenes::gltf::{GltfError, Imported, import_bytes};
