@@ -140,12 +140,10 @@ impl SceneFile {
             }
         }
         let model = self.gltf.map(|g| g.load(folder)).transpose()?.unwrap_or_default();
-        for o in model.objects {
-            if objects.iter().any(|b| b.name == o.name) {
-                return Err(format!("an object and a part of gltf.file are both called '{}'", o.name));
-            }
-            objects.push(o);
+        if let Some(o) = objects.iter().find(|o| model.objects.iter().any(|m| m.name == o.name)) {
+            return Err(format!("an object and a part of gltf.file are both called '{}'", o.name));
         }
+        objects.extend(model.objects);
         if objects.iter().all(|o| o.occluder) {
             return Err("the scene has no receiver: give at least one object that is not an occluder".into());
         }

@@ -61,8 +61,8 @@ fn the_views_come_back_as_cameras() {
     }
 }
 
-#[test]
-fn materials_textures_lights_and_cameras_come_back() {
+/// A scene with all that generated ones lack.
+fn rich() -> Scene {
     let mut scene = library::scene("curtain-open").unwrap();
     let texture = Arc::new(Texture { size: [3, 2], texels: (0..6).map(|i| [i * 40, 255 - i, 7, 100 + i]).collect() });
     let ground = &mut scene.objects[0];
@@ -97,6 +97,12 @@ fn materials_textures_lights_and_cameras_come_back() {
         up: Vec3::Z,
         projection: Projection::Perspective { fov_y: 1.0, aspect: None, near: 0.5, far: Some(9.0) },
     }];
+    scene
+}
+
+#[test]
+fn materials_textures_lights_and_cameras_come_back() {
+    let mut scene = rich();
     let back = round_trip(&scene);
     for (a, b) in back.objects.iter().zip(&scene.objects) {
         assert_eq!((&a.mesh, &a.material.texture), (&b.mesh, &b.material.texture));
@@ -139,13 +145,13 @@ fn the_views_are_told_to_programs() {
     assert!((json["look"]["fov_y"].as_f64().unwrap() - f64::from(scene.look.fov.to_radians())).abs() < 1e-6);
 }
 
-/// Leaves the built-in scenes as GLB where the Khronos validator finds them.
+/// Leaves the built-in scenes, and a rich one, as GLB where the Khronos validator finds them.
 #[test]
 fn built_in_scenes_are_left_for_the_validator() {
     let Some(folder) = std::env::var_os("AOGAUGE_GLB_OUT").map(std::path::PathBuf::from) else { return };
     std::fs::create_dir_all(&folder).unwrap();
-    for (name, _) in library::SCENES {
-        let scene = library::scene(name).unwrap();
+    let built_in = library::SCENES.map(|(name, _)| (name, library::scene(name).unwrap()));
+    for (name, scene) in built_in.into_iter().chain([("rich", rich())]) {
         write_glb(&scene, std::fs::File::create(folder.join(format!("{name}.glb"))).unwrap()).unwrap();
     }
 }
