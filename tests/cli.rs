@@ -446,13 +446,15 @@ fn programs_can_read_the_results() {
 
 #[test]
 fn every_verb_shows_an_example() {
-    let verbs: [&[&str]; 8] = [
+    let verbs: [&[&str]; 10] = [
         &[],
         &["run"],
         &["report"],
         &["golden", "approve"],
         &["golden", "verify"],
         &["scene", "list"],
+        &["scene", "show"],
+        &["scene", "export"],
         &["doctor"],
         &["schema"],
     ];
@@ -487,4 +489,42 @@ fn no_driver_is_no_error_unless_a_gpu_is_asked_for() {
     let asked = blind(&["run", text(&suite), "--out", text(&out), "--renderer", "gpu"]);
     assert_eq!(asked.status.code(), Some(2));
     assert_eq!(record(&out)["seed"], 1, "the older record stays");
+}
+
+#[test]
+fn a_scene_can_be_shown_and_taken_elsewhere() {
+    let dir = tempfile::tempdir().unwrap();
+    let preview = dir.path().join("preview.png");
+    let shown = aogauge(&["scene", "show", "pillar", "--preview", text(&preview), "--rays", "1"]);
+    let printed = String::from_utf8_lossy(&shown.stdout).into_owned();
+    assert!(
+        printed.contains("second-curtain") && printed.contains("occluder") && printed.contains("bounds"),
+        "{printed}"
+    );
+    assert!(fs::read(&preview).unwrap().starts_with(b"\x89PNG"));
+    let json: Value =
+        serde_json::from_slice(&aogauge(&["scene", "show", "pillar", "--format", "json"]).stdout).unwrap();
+    assert_eq!(json["radius"], 0.25);
+    expect(2, &["scene", "show", "piller"]);
+
+    let kit = dir.path().join("kit");
+    expect(0, &["scene", "export", "pillar", "--out", text(&kit)]);
+    for file in ["pillar.glb", "pillar.twin.glb", "views.json", "regions.exr", "gbuffer.exr", "README.md"] {
+        assert!(kit.join(file).exists(), "{file}");
+    }
+    let masks = aogauge::layers::Layers::read(&kit.join("regions.exr")).unwrap();
+    assert_eq!(masks.layers["footprint"].iter().sum::<f32>(), 384.0);
+    let surfaces = aogauge::layers::Layers::read(&kit.join("gbuffer.exr")).unwrap();
+    assert!(surfaces.layers["normal.z"].iter().all(|n| (n - 1.0).abs() < 1e-6));
+
+    // A scene of the exported model, with views found from its sheet.
+    let own = dir.path().join("own.toml");
+    fs::write(
+        &own,
+        "description = \"x\"\nao = { radius = 0.25 }\nenvironment = { radiance = 1.0 }\n[gltf]\nfile = \"kit/pillar.glb\"\noccluders = [\"curtain\"]\n",
+    )
+    .unwrap();
+    let json: Value =
+        serde_json::from_slice(&aogauge(&["scene", "show", text(&own), "--format", "json"]).stdout).unwrap();
+    assert_eq!(json["triangles"], 56, "{json}");
 }

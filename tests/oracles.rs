@@ -58,7 +58,7 @@ shape = {{ curtain = {{ thickness = {w}, gap = {m}, height = 1.0, length = 6.0 }
 "#,
         0.8 * m
     );
-    Scene::from_toml("oracle", "oracle.toml", &text).unwrap()
+    Scene::from_toml("oracle", "oracle.toml", &text, None).unwrap()
 }
 
 /// Openness of one point of the ground, over replicates.

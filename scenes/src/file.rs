@@ -6,11 +6,13 @@ use crate::{
     derive,
     environment::EnvironmentFile,
     generators::Shape,
+    gltf::GltfTable,
     luminance,
     view::{LookFile, MeasureFile},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// Why a scene cannot be used. The message names the file and the line or field.
 #[derive(Debug, thiserror::Error)]
@@ -69,8 +71,10 @@ pub(crate) struct SceneFile {
     /// Where pictures are taken; towards the middle of the measure view unless
     /// given.
     look: Option<LookFile>,
-    /// The geometry.
-    #[serde(rename = "object")]
+    /// Geometry from a model.
+    gltf: Option<GltfTable>,
+    /// The geometry, or what is added to the model.
+    #[serde(rename = "object", default)]
     objects: Vec<ObjectFile>,
 }
 
@@ -121,7 +125,7 @@ impl ObjectFile {
 }
 
 impl SceneFile {
-    fn build(self, name: &str) -> Result<Scene, String> {
+    fn build(self, name: &str, folder: Option<&Path>) -> Result<Scene, String> {
         check_name(name).map_err(|e| format!("the scene's name, its file's without the ending: {e}"))?;
         let mut objects = Vec::with_capacity(self.objects.len());
         for o in self.objects {
@@ -140,6 +144,11 @@ impl SceneFile {
                 });
             }
         }
+        let model = self.gltf.map(|g| g.load(folder)).transpose()?.unwrap_or_default();
+        if let Some(o) = objects.iter().find(|o| model.objects.iter().any(|m| m.name == o.name)) {
+            return Err(format!("an object and a part of gltf.file are both called '{}'", o.name));
+        }
+        objects.extend(model.objects);
         if objects.iter().all(|o| o.occluder) {
             return Err("the scene has no receiver: give at least one object that is not an occluder".into());
         }
@@ -163,12 +172,15 @@ impl SceneFile {
             measure,
             look,
             objects,
+            lights: model.lights,
+            cameras: model.cameras,
         })
     }
 }
 
 impl Scene {
-    /// Reads a scene from TOML. `file` is what errors call it.
+    /// Reads a scene from TOML. `file` is what errors call it; a model that it
+    /// names is looked for in `folder`, and is an error without one.
     ///
     /// # Errors
     /// [`SceneError::Toml`] with line and column for anything one value gets
@@ -186,14 +198,14 @@ impl Scene {
     /// name = "floor"
     /// shape = { plane = { center = [0, 0, 0], u = [0, 0, 4], v = [4, 0, 0] } }
     /// "#;
-    /// let scene = aogauge_scenes::Scene::from_toml("plane", "plane.toml", toml)?;
+    /// let scene = aogauge_scenes::Scene::from_toml("plane", "plane.toml", toml, None)?;
     /// assert_eq!(scene.ao.secondary_radius, 0.0625);
     /// # Ok::<(), aogauge_scenes::SceneError>(())
     /// ```
-    pub fn from_toml(name: &str, file: &str, text: &str) -> Result<Scene, SceneError> {
+    pub fn from_toml(name: &str, file: &str, text: &str, folder: Option<&Path>) -> Result<Scene, SceneError> {
         let parsed: SceneFile =
             toml::from_str(text).map_err(|e| SceneError::Toml { file: file.to_owned(), source: Box::new(e) })?;
-        parsed.build(name).map_err(|message| SceneError::Invalid { file: file.to_owned(), message })
+        parsed.build(name, folder).map_err(|message| SceneError::Invalid { file: file.to_owned(), message })
     }
 
     /// Reads a scene file; its name is the file's, without the ending.
@@ -201,11 +213,11 @@ impl Scene {
     /// # Errors
     /// [`SceneError::Read`] where the file cannot be read, else as
     /// [`Scene::from_toml`].
-    pub fn from_file(path: &std::path::Path) -> Result<Scene, SceneError> {
+    pub fn from_file(path: &Path) -> Result<Scene, SceneError> {
         let file = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { file: file.clone(), source })?;
         let name = path.file_stem().map_or_else(|| file.clone(), |s| s.to_string_lossy().into_owned());
-        Scene::from_toml(&name, &file, &text)
+        Scene::from_toml(&name, &file, &text, Some(path.parent().unwrap_or(Path::new("."))))
     }
 
     /// The JSON Schema of scene files.

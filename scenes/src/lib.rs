@@ -10,20 +10,27 @@
 //! -Z forward, as in glTF.
 
 mod bounded;
+mod camera;
 mod derive;
 mod environment;
 mod file;
 pub mod generators;
+pub mod gltf;
 pub mod library;
+mod light;
 mod material;
 mod mesh;
 mod scene;
 mod view;
+mod views_json;
 
 pub use bounded::check_name;
+pub use camera::{Camera, Projection};
 pub use environment::{Environment, Portal, Sky};
 pub use file::SceneError;
+pub use light::{Light, LightKind};
 pub use material::{MAX_ALBEDO, Material, Texture, luminance};
 pub use mesh::{Mesh, MeshError, closest_point};
 pub use scene::{AoScale, Object, Scene};
 pub use view::{LookView, MeasureView, View};
+pub use views_json::views_json;

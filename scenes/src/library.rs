@@ -35,7 +35,7 @@ pub fn scene(name: &str) -> Result<Scene, SceneError> {
         .iter()
         .find(|(n, _)| *n == name)
         .ok_or_else(|| SceneError::Unknown { name: name.to_owned(), known: SCENES.map(|(n, _)| n).join(", ") })?;
-    Scene::from_toml(name, &format!("{name}.toml (built in)"), text)
+    Scene::from_toml(name, &format!("{name}.toml (built in)"), text, None)
 }
 
 #[cfg(test)]

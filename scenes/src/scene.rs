@@ -1,6 +1,6 @@
 //! A scene: objects, light, scale and views.
 
-use crate::{Environment, LookView, Material, MeasureView, Mesh, Sky};
+use crate::{Camera, Environment, Light, LightKind, LookView, Material, MeasureView, Mesh, Sky};
 use glam::Vec3;
 use sha2::{Digest, Sha256};
 
@@ -45,6 +45,10 @@ pub struct Scene {
     pub look: LookView,
     /// The geometry; at least one object is no occluder.
     pub objects: Vec<Object>,
+    /// Punctual lights beside the environment; none of generated scenes.
+    pub lights: Vec<Light>,
+    /// Cameras that a model brought along; none of generated scenes.
+    pub cameras: Vec<Camera>,
 }
 
 impl Scene {
@@ -67,8 +71,8 @@ impl Scene {
     }
 
     /// Content hash (SHA-256, hex) of everything that can change a measurement:
-    /// geometry, materials, light, scale, measure view. Names, descriptions and
-    /// the look view do not count.
+    /// geometry, materials, light, scale, measure view. Names, descriptions, the
+    /// look view and other cameras do not count.
     pub fn hash(&self) -> String {
         let mut sha = Sha256::new();
         let mut floats = |values: &[f32]| {
@@ -93,10 +97,21 @@ impl Scene {
             floats(&v.to_array());
         }
         floats(&[m.clearance, m.pixel]);
+        for light in &self.lights {
+            floats(&light_numbers(light));
+        }
         for o in &self.objects {
             floats(&[o.material.albedo(), f32::from(u8::from(o.occluder))]);
             if o.material.emissive != [0.0; 3] {
                 floats(&o.material.emissive);
+            }
+            if let Some(texture) = &o.material.texture {
+                for texel in &texture.texels {
+                    floats(&texel.map(f32::from));
+                }
+                for uv in &o.mesh.uvs {
+                    floats(&uv.to_array());
+                }
             }
             for corners in o.mesh.corners() {
                 for v in corners {
@@ -109,4 +124,16 @@ impl Scene {
         }
         sha.finalize().iter().map(|b| format!("{b:02x}")).collect()
     }
+}
+
+/// Everything about a light that can change a measurement.
+fn light_numbers(light: &Light) -> Vec<f32> {
+    let (kind, inner, outer) = match light.kind {
+        LightKind::Directional => (0.0, 0.0, 0.0),
+        LightKind::Point => (1.0, 0.0, 0.0),
+        LightKind::Spot { inner, outer } => (2.0, inner, outer),
+    };
+    let mut numbers = vec![kind, inner, outer, light.intensity, light.range.unwrap_or(f32::INFINITY)];
+    numbers.extend(light.position.to_array().into_iter().chain(light.direction.to_array()).chain(light.color));
+    numbers
 }

@@ -43,7 +43,7 @@ name = "it"
 [object.shape.{family}]
 {parameters}"#
     );
-    let scene = Scene::from_toml("test", "test.toml", &text).map_err(|e| e.to_string())?;
+    let scene = Scene::from_toml("test", "test.toml", &text, None).map_err(|e| e.to_string())?;
     Ok(scene.objects.into_iter().skip(1).collect())
 }
 

@@ -349,7 +349,7 @@ shape = {{ polygons = {{ positions = [[0, 0, 0.35], [0, 1, 0.35], [0, 1, 0.9], [
             positions.join(", "),
             triangles.join(", ")
         );
-        let scene = Scene::from_toml("x", "x.toml", &text).unwrap();
+        let scene = Scene::from_toml("x", "x.toml", &text, None).unwrap();
         let geometry = Geometry::new(&scene).unwrap();
         let gbuffer = GBuffer::new(&geometry.tracer, &scene.measure.view());
         let regions = Regions::new(&scene, &geometry.tracer, &gbuffer);

@@ -167,7 +167,7 @@ measure = {{ center = [0, 0, 0], normal = [0, 1, 0], transect = [1, 0, 0], clear
 look = {{ eye = [1, 1, 1], target = [0, 0, 0], resolution = [16, 16] }}
 {objects}"#
         );
-        Geometry::new(&Scene::from_toml("test", "test.toml", &text).unwrap()).unwrap()
+        Geometry::new(&Scene::from_toml("test", "test.toml", &text, None).unwrap()).unwrap()
     }
 
     fn mean(geometry: &Geometry, point: Vec3, normal: Vec3, n: u32) -> (f64, f64) {

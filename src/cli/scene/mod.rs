@@ -1,5 +1,6 @@
 //! `aogauge scene`
 
+mod export;
 mod list;
 mod show;
 
@@ -13,12 +14,14 @@ use std::path::Path;
 pub enum Verb {
     List(list::Args),
     Show(show::Args),
+    Export(export::Args),
 }
 
 pub fn execute(verb: &Verb) -> Result<Exit, Failure> {
     match verb {
         Verb::List(args) => list::execute(args),
         Verb::Show(args) => show::execute(args),
+        Verb::Export(args) => export::execute(args),
     }
 }
 

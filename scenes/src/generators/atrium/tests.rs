@@ -179,7 +179,7 @@ fn scene(shape: &str) -> Result<Scene, String> {
          look = {{ eye = [1, 1, 1], target = [0, 0, 0], resolution = [16, 16] }}\n\
          [[object]]\nname = \"atrium\"\nshape = {{ atrium = {{ {shape} }} }}\n"
     );
-    Scene::from_toml("test", "test.toml", &text).map_err(|e| e.to_string())
+    Scene::from_toml("test", "test.toml", &text, None).map_err(|e| e.to_string())
 }
 
 #[test]

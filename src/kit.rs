@@ -1,0 +1,100 @@
+//! A scene packed for other renderers: geometry with and without the occluder,
+//! views, region map, G-buffer, and a page that says what to render.
+
+use crate::{
+    disk::{DiskError, write_whole},
+    layers::Layers,
+    metrics::regions::{Region, Regions},
+    render::{Geometry, RenderError, gbuffer::GBuffer},
+    scenes::{Scene, gltf, views_json},
+};
+use std::{io::Write, path::Path};
+
+/// Why a kit could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum KitError {
+    /// A file could not be written.
+    #[error(transparent)]
+    Disk(#[from] DiskError),
+    /// The scene cannot be traced.
+    #[error("scene '{scene}': {source}")]
+    Render {
+        /// The scene.
+        scene: String,
+        /// Why.
+        source: RenderError,
+    },
+}
+
+/// Writes `NAME.glb`, `NAME.twin.glb` (where there is an occluder), `views.json`,
+/// `regions.exr`, `gbuffer.exr` and `README.md` into a folder.
+///
+/// # Errors
+/// Where a file cannot be written or the scene is too deep to trace.
+pub fn write(scene: &Scene, folder: &Path) -> Result<(), KitError> {
+    let render = |source| KitError::Render { scene: scene.name.clone(), source };
+    let glb = |scene: &Scene, file: String| {
+        write_whole(&folder.join(file), |out| gltf::write_glb(scene, out).map_err(std::io::Error::other))
+    };
+    glb(scene, format!("{}.glb", scene.name))?;
+    if scene.has_occluder() {
+        glb(&scene.twin(), format!("{}.twin.glb", scene.name))?;
+    }
+    let views = views_json(scene);
+    write_whole(&folder.join("views.json"), |out| out.write_all(views.as_bytes()))?;
+    let geometry = Geometry::new(scene).map_err(render)?;
+    let view = scene.measure.view();
+    let gbuffer = GBuffer::new(&geometry.tracer, &view);
+    let regions = Regions::new(scene, &geometry.tracer, &gbuffer);
+    let mut masks = Layers::new(view.resolution);
+    for region in Region::ALL {
+        masks = masks.with(region.label(), regions.mask(region, view.pixels()));
+    }
+    masks.write(&folder.join("regions.exr"))?;
+    let channel = |f: &dyn Fn(&crate::render::gbuffer::Surface) -> f32| -> Vec<f32> {
+        gbuffer.surfaces.iter().map(|s| s.as_ref().map_or(f32::NAN, f)).collect()
+    };
+    let mut surfaces = Layers::new(view.resolution);
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        surfaces = surfaces
+            .with(&format!("position.{name}"), channel(&|s| s.point[axis]))
+            .with(&format!("normal.{name}"), channel(&|s| s.normal[axis]));
+    }
+    surfaces.write(&folder.join("gbuffer.exr"))?;
+    let page = page(scene);
+    write_whole(&folder.join("README.md"), |out| out.write_all(page.as_bytes()))?;
+    Ok(())
+}
+
+fn page(scene: &Scene) -> String {
+    let name = &scene.name;
+    let m = &scene.measure;
+    let [w, h] = m.resolution;
+    let twin = if scene.has_occluder() {
+        format!("- `{name}.twin.glb`: the same scene with the occluder under judgement taken away.\n")
+    } else {
+        String::new()
+    };
+    format!(
+        "# {name}\n\n{}\n\n\
+         ## What is here\n\n\
+         - `{name}.glb`: the scene, metres, +Y up, right-handed (glTF 2.0). Nodes of occluders carry `extras.aogauge.occluder`.\n{twin}\
+         - `views.json`: both views, R and R' as numbers. The glb holds them too, as the cameras `measure` (orthographic) and `look` (perspective).\n\
+         - `regions.exr`: masks of 0 and 1 in the measure view: all, footprint, left, right, far.\n\
+         - `gbuffer.exr`: position and geometric normal behind each pixel centre of the measure view; NaN where there is none.\n\n\
+         ## What to render\n\n\
+         1. From camera `measure`, {w} x {h} pixels, one sample at each pixel's centre, rows from the top, x along the transect {:?}.\n\
+         2. Openness, linear and without a transfer curve: 1 is fully open, 0 closed. Not occlusion, not multiplied with a colour, not blurred.\n\
+         3. Rays of length R = {} m, cosine distributed about the geometric normal.\n\
+         4. Half the secondary ray, for the extended method: R' = {} m.\n\
+         5. Several images with seeds of their own, better than one with more rays: intervals are taken over them.\n\n\
+         ## How to name it\n\n\
+         `{name}.<estimator>.<rays>.<replicate>.exr`, 32-bit float, one channel `Y` (or the same value in R, G and B); \
+         for example `{name}.classic.32.0003.exr`.\n\n\
+         Compare your positions with `gbuffer.exr` first: if they differ by more than rounding, the camera is wrong, not the AO.\n",
+        scene.description,
+        m.transect.to_array(),
+        scene.ao.radius,
+        scene.ao.secondary_radius,
+    )
+}
