@@ -2,6 +2,11 @@
 import sys
 
 import bpy
+import numpy
+
+# Blender 3.4's importer uses an alias that numpy 1.24 dropped.
+if "bool" not in numpy.__dict__:
+    numpy.bool = bool
 
 failed = False
 for path in sys.argv[sys.argv.index("--") + 1:]:

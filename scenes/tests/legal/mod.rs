@@ -1,0 +1,131 @@
+//! Parameter sets of the families, read from the published schema: shared by the
+//! tests of the meshes and of rendering them.
+
+#![allow(dead_code, clippy::unwrap_used, clippy::panic)]
+
+use aogauge_scenes::{Object, Scene};
+use proptest::prelude::*;
+use serde_json::Value;
+
+/// The families, with the type that declares their parameters.
+pub const FAMILIES: [(&str, &str); 12] = [
+    ("curtain", "Curtain"),
+    ("banner", "Banner"),
+    ("slatted-fence", "SlattedFence"),
+    ("blinds", "Blinds"),
+    ("shelf", "Shelf"),
+    ("table", "Table"),
+    ("leaves", "Leaves"),
+    ("cables", "Cables"),
+    ("pillar", "Pillar"),
+    ("crevice", "Crevice"),
+    ("sphere", "Sphere"),
+    ("ridge", "Ridge"),
+];
+
+/// A scene of a floor and a shape with these parameters.
+pub fn scene(family: &str, parameters: &str) -> Result<Scene, String> {
+    let text = format!(
+        r#"
+description = "test"
+ao = {{ radius = 0.25 }}
+environment = {{ radiance = 1.0 }}
+measure = {{ center = [0, 0, 0], normal = [0, 1, 0], transect = [1, 0, 0], clearance = 0.1, resolution = [16, 16] }}
+look = {{ eye = [1, 1, 1], target = [0, 0, 0], resolution = [16, 16] }}
+[[object]]
+name = "floor"
+shape = {{ plane = {{ center = [0, 0, 0], u = [0, 0, 6], v = [6, 0, 0] }} }}
+[[object]]
+name = "it"
+[object.shape.{family}]
+{parameters}"#
+    );
+    Scene::from_toml("test", "test.toml", &text, None).map_err(|e| e.to_string())
+}
+
+/// The shape's own objects.
+pub fn shape(family: &str, parameters: &str) -> Result<Vec<Object>, String> {
+    Ok(scene(family, parameters)?.objects.into_iter().skip(1).collect())
+}
+
+/// A parameter and what it may be.
+#[derive(Clone, Debug)]
+pub struct Parameter {
+    pub name: String,
+    pub kind: Kind,
+}
+
+#[derive(Clone, Debug)]
+pub enum Kind {
+    Number { zero: bool, min: f64, max: f64 },
+    Count { min: u64, max: u64 },
+    Choice(Vec<String>),
+}
+
+pub fn parameters(family: &str) -> Vec<Parameter> {
+    let schema = serde_json::to_value(Scene::file_schema()).unwrap();
+    let mut found = Vec::new();
+    collect(&schema, &schema["$defs"][family], "", &mut found);
+    assert!(!found.is_empty(), "{family} is not in the schema");
+    found
+}
+
+fn collect(schema: &Value, of: &Value, prefix: &str, found: &mut Vec<Parameter>) {
+    for (name, declared) in of["properties"].as_object().unwrap() {
+        let name = format!("{prefix}{name}");
+        let target = |v: &Value| v["$ref"].as_str().map(|r| schema.pointer(r.trim_start_matches('#')).unwrap().clone());
+        let optional = declared["anyOf"].get(0).and_then(target);
+        let declared = target(declared).or(optional).unwrap_or_else(|| declared.clone());
+        let bound = |key: &str| declared[key].as_f64().or(declared["anyOf"][1][key].as_f64());
+        let kind = if declared["properties"].is_object() {
+            collect(schema, &declared, &format!("{name}."), found);
+            continue;
+        } else if let Some(choices) = declared["oneOf"].as_array() {
+            Kind::Choice(choices.iter().map(|c| c["const"].to_string()).collect())
+        } else if let Some(choices) = declared["enum"].as_array() {
+            Kind::Choice(choices.iter().map(Value::to_string).collect())
+        } else if declared["type"] == "boolean" {
+            Kind::Choice(vec!["true".into(), "false".into()])
+        } else {
+            let (Some(min), Some(max)) = (bound("minimum"), bound("maximum")) else {
+                panic!("{name} has no bounds: {declared}");
+            };
+            match declared["type"].as_str() {
+                Some("integer") => Kind::Count { min: min as u64, max: max as u64 },
+                _ => Kind::Number { zero: declared["anyOf"].is_array(), min, max },
+            }
+        };
+        found.push(Parameter { name, kind });
+    }
+}
+
+/// Values of a parameter: its ends, its default (none), and all between, small
+/// ones as often as large ones.
+fn values(kind: &Kind) -> BoxedStrategy<Option<String>> {
+    let any = match kind.clone() {
+        Kind::Choice(choices) => prop::sample::select(choices).boxed(),
+        // What is capped high is drawn low most of the time, to keep the test quick.
+        Kind::Count { min, max } => {
+            prop_oneof![8 => min..=max.min(min + 40), 1 => min..=max.min(2000)].prop_map(|n| n.to_string()).boxed()
+        }
+        Kind::Number { zero, min, max } => {
+            let scaled = (0.0..1.0f64).prop_map(move |u| min + (max - min) * u.powi(6));
+            let low = if zero { 0.0 } else { min };
+            prop_oneof![10 => scaled, 2 => min..=max, 1 => Just(low), 1 => Just(min), 1 => Just(max)]
+                .prop_map(|v| format!("{v:.6}"))
+                .boxed()
+        }
+    };
+    prop_oneof![any.prop_map(Some), Just(None)].boxed()
+}
+
+pub fn legal(parameters: &[Parameter]) -> impl Strategy<Value = String> + use<> {
+    let all: Vec<_> = parameters
+        .iter()
+        .map(|p| {
+            let name = p.name.clone();
+            values(&p.kind).prop_map(move |v| v.map(|v| format!("{name} = {v}\n")).unwrap_or_default())
+        })
+        .collect();
+    all.prop_map(|lines| lines.concat())
+}

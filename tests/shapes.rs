@@ -1,0 +1,36 @@
+//! Every legal parameter set of every family gives a scene that renders.
+
+#![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
+
+#[path = "../scenes/tests/legal/mod.rs"]
+mod legal;
+
+use aogauge::render::{Estimator, Geometry, Job, ReceiverPlane, Renderer, cpu::Cpu};
+use legal::{FAMILIES, legal, parameters, scene};
+use proptest::test_runner::{Config, TestRunner};
+
+#[test]
+fn every_legal_parameter_set_gives_a_scene_that_renders() {
+    for (family, declared) in FAMILIES {
+        let config = Config { cases: 24, failure_persistence: None, ..Config::default() };
+        let mut runner =
+            TestRunner::new_with_rng(config, proptest::test_runner::TestRng::deterministic_rng(Default::default()));
+        runner
+            .run(&legal(&parameters(declared)), |text| {
+                // Values that do not go together are refused; the meshes' own test
+                // holds them to their message.
+                let Ok(scene) = scene(family, &text) else {
+                    return Ok(());
+                };
+                let geometry = Geometry::new(&scene).unwrap_or_else(|e| panic!("{family}: {text}: {e}"));
+                let view = scene.look.view();
+                let estimator = Estimator::Extended { receiver_plane: ReceiverPlane::Clipped };
+                let job = Job { view: &view, estimator, ao: scene.ao, rays: 2, seed: 1, replicate: 0 };
+                let frame = Cpu.load(&geometry).unwrap().render(&job).unwrap();
+                assert!(frame.values.iter().all(|v| v.is_nan() || (0.0..=1.0).contains(v)), "{family}: {text}");
+                assert!(frame.values.iter().any(|v| !v.is_nan()), "{family}: {text}: nothing is seen");
+                Ok(())
+            })
+            .unwrap_or_else(|e| panic!("{family}: {e}"));
+    }
+}
