@@ -405,6 +405,61 @@ shape = {{ polygons = {{ positions = [[0, 0, 0.35], [0, 1, 0.35], [0, 1, 0.9], [
         assert!(left.abs_diff(right) <= 8 && left > 1200, "{left}, {right}");
     }
 
+    /// A pleated sheet of no thickness: the footprint is what lies within 0.02 R of
+    /// the zigzag of its hem, flanks what lies 0.15 R to 0.45 R from it.
+    #[test]
+    fn under_pleats_the_regions_follow_the_hem() {
+        let text = r#"
+description = "x"
+ao = { radius = 0.25 }
+environment = { radiance = 1.0 }
+measure = { center = [0, 0, 0], normal = [0, 1, 0], transect = [1, 0, 0], clearance = 0.04, resolution = [96, 96] }
+look = { eye = [1, 1, 1], target = [0, 0, 0], resolution = [16, 16] }
+[[object]]
+name = "floor"
+shape = { plane = { center = [0, 0, 0], u = [0, 0, 6], v = [6, 0, 0] } }
+[[object]]
+name = "sheet"
+occluder = true
+shape = { curtain = { thickness = 0, gap = 0.05, height = 1.0, length = 2.0, folds = "pleated", pleat_width = 0.1, pleat_depth = 0.06 } }
+"#;
+        let scene = Scene::from_toml("x", "x.toml", text, None).unwrap();
+        let geometry = Geometry::new(&scene).unwrap();
+        let gbuffer = GBuffer::new(&geometry.tracer, &scene.measure.view());
+        let regions = Regions::new(&scene, &geometry.tracer, &gbuffer);
+        let hem: Vec<[Vec2; 2]> = scene.objects[1]
+            .mesh
+            .corners()
+            .flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]])
+            .filter(|edge| edge.iter().all(|v| (v.y - 0.05).abs() < 1e-6))
+            .map(|edge| edge.map(|v| Vec2::new(v.x, v.z)))
+            .collect();
+        assert!(hem.len() >= 20, "{}", hem.len());
+        let mut checked = [0; 2];
+        for (i, s) in gbuffer.surfaces.iter().enumerate() {
+            let p = s.map(|s| Vec2::new(s.point.x, s.point.z)).unwrap();
+            let distance = hem
+                .iter()
+                .map(|[a, b]| {
+                    let t = ((p - *a).dot(*b - *a) / (*b - *a).length_squared()).clamp(0.0, 1.0);
+                    (*a + (*b - *a) * t).distance(p) / 0.25
+                })
+                .fold(f32::INFINITY, f32::min);
+            let is = |region| regions.pixels(region).contains(&(i as u32));
+            if (distance - 0.02).abs() > 1e-3 {
+                assert_eq!(is(Region::Footprint), distance < 0.02, "{p}: {distance}");
+                checked[0] += usize::from(distance < 0.02);
+            }
+            for (region, side) in [(Region::Left, p.x < 0.0), (Region::Right, p.x > 0.0)] {
+                if is(region) {
+                    assert!(side && (0.149..0.451).contains(&distance), "{p}: {distance}");
+                    checked[1] += 1;
+                }
+            }
+        }
+        assert!(checked[0] > 200 && checked[1] > 2000, "{checked:?}");
+    }
+
     #[test]
     fn without_an_occluder_there_is_no_footprint() {
         let (_, gbuffer, regions) = regions("plane");
