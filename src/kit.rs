@@ -6,7 +6,7 @@ use crate::{
     layers::Layers,
     metrics::regions::{Region, Regions},
     render::{Geometry, RenderError, gbuffer::GBuffer},
-    scenes::{Scene, gltf, views_json},
+    scenes::{Scene, Sky, gltf, views_json},
 };
 use std::{io::Write, path::Path};
 
@@ -87,7 +87,8 @@ fn page(scene: &Scene) -> String {
          2. Openness, linear and without a transfer curve: 1 is fully open, 0 closed. Not occlusion, not multiplied with a colour, not blurred.\n\
          3. Rays of length R = {} m, cosine distributed about the geometric normal.\n\
          4. Half the secondary ray, for the extended method: R' = {} m.\n\
-         5. Several images with seeds of their own, better than one with more rays: intervals are taken over them.\n\n\
+         5. AO needs no light. The judge's light is {}; the glb does not hold it.\n\
+         6. Several images with seeds of their own, better than one with more rays: intervals are taken over them.\n\n\
          ## How to name it\n\n\
          `{name}.<estimator>.<rays>.<replicate>.exr`, 32-bit float, one channel `Y` (or the same value in R, G and B); \
          for example `{name}.classic.32.0003.exr`.\n\n\
@@ -96,5 +97,11 @@ fn page(scene: &Scene) -> String {
         m.transect.to_array(),
         scene.ao.radius,
         scene.ao.secondary_radius,
+        match scene.environment.sky {
+            Sky::None => "what the emissive surfaces send out".to_owned(),
+            Sky::Uniform(radiance) => format!("a uniform sky of radiance {radiance}"),
+            Sky::Gradient { zenith, horizon, ground } =>
+                format!("a sky of radiance {zenith} at the zenith, {horizon} at the horizon and {ground} below"),
+        },
     )
 }

@@ -527,4 +527,6 @@ fn a_scene_can_be_shown_and_taken_elsewhere() {
     let json: Value =
         serde_json::from_slice(&aogauge(&["scene", "show", text(&own), "--format", "json"]).stdout).unwrap();
     assert_eq!(json["triangles"], 56, "{json}");
+    assert!(json["parameters"].as_str().unwrap().contains("kit/pillar.glb"), "the file's own text: {json}");
+    assert!(expect(2, &["scene", "show", "kit/pillar.glb"]).contains("[gltf]"));
 }

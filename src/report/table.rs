@@ -57,7 +57,8 @@ pub fn value_text(value: Option<f64>, interval: Option<[f64; 2]>) -> String {
 pub fn plus_minus(value: f64, [lo, hi]: [f64; 2]) -> String {
     let half = (hi - lo) / 2.0;
     let d = digits(half);
-    format!("{value:.d$} ± {half:.d$}")
+    // Non-breaking, so that narrow columns keep it on one line.
+    format!("{value:.d$}\u{a0}±\u{a0}{half:.d$}")
 }
 
 /// The case of a verdict, or `scene (judge)`.
@@ -132,7 +133,7 @@ mod tests {
         assert_eq!(value_text(Some(0.123_456), Some([0.12, 0.13])), "0.1235 [0.1200, 0.1300]");
         assert_eq!(value_text(Some(-1.0), Some([-1.5, -0.5])), "-1.00 [-1.50, -0.50]");
         assert_eq!(value_text(Some(1.0), Some([1.0, 1.0])), "1.0000 [1.0000, 1.0000]");
-        assert_eq!(plus_minus(0.123_456, [0.118_456, 0.128_456]), "0.1235 ± 0.0050");
+        assert_eq!(plus_minus(0.123_456, [0.118_456, 0.128_456]), "0.1235\u{a0}±\u{a0}0.0050");
         assert_eq!(value_text(None, None), "none");
     }
 }

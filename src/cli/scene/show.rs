@@ -1,11 +1,11 @@
 //! `aogauge scene show`
 
-use super::load;
+use super::{load, source};
 use crate::{
     cli::{Exit, Failure, Format, json, print, tell},
     render::{Estimator, Geometry, Job, Renderer, cpu::Cpu},
     report::picture,
-    scenes::{LookView, MeasureView, Scene, library},
+    scenes::{LookView, MeasureView, Scene},
 };
 use serde::Serialize;
 use std::path::PathBuf;
@@ -42,8 +42,8 @@ struct Shown {
     measure: Measure,
     look: Look,
     objects: Vec<Shape>,
-    /// The scene file's text; null for scenes from a path.
-    parameters: Option<&'static str>,
+    /// The scene file's text.
+    parameters: String,
 }
 
 #[derive(Serialize)]
@@ -72,7 +72,7 @@ struct Shape {
     bounds: [[f32; 3]; 2],
 }
 
-fn shown(scene: &Scene) -> Shown {
+fn shown(scene: &Scene, parameters: String) -> Shown {
     let objects: Vec<Shape> = scene
         .objects
         .iter()
@@ -107,7 +107,7 @@ fn shown(scene: &Scene) -> Shown {
         },
         look: Look { eye: eye.to_array(), target: target.to_array(), fov, resolution: look },
         objects,
-        parameters: library::SCENES.iter().find(|(n, _)| *n == scene.name).map(|(_, text)| *text),
+        parameters,
     }
 }
 
@@ -143,16 +143,14 @@ impl Shown {
             let mark = if o.occluder { "occluder" } else { "" };
             text += &format!("  {:<28} {:>9} triangles  {mark}\n", o.name, o.triangles);
         }
-        if let Some(parameters) = self.parameters {
-            text += &format!("\n{parameters}");
-        }
+        text += &format!("\n{}", self.parameters);
         text
     }
 }
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
     let scene = load(&args.scene)?;
-    let shown = shown(&scene);
+    let shown = shown(&scene, source(&args.scene)?);
     print(&match args.format {
         Format::Json => json(&shown)?,
         Format::Text => shown.text(),

@@ -1,30 +1,25 @@
-//! A plan becomes a record: render, measure, judge, write.
+//! One scene of a plan: made ready, rendered, judged, written.
 
+use super::{
+    MAX_GIB, Progress, RunError,
+    case_metrics::{Others, metrics},
+};
 use crate::{
-    disk::DiskError,
-    gate::Verdict,
     layers::{Layers, pixel_hash},
     metrics::{
         Absent, Metric, MetricName,
         artifact::{Converged, Method as Measured},
-        error,
         judge::{Judge, Pair},
         profile,
         regions::{Region, Regions},
     },
-    record::{
-        CaseRecord, IdleGate, JudgeRecord, Machine, Record, RecordFolder, RegionQ, SceneRecord, SuiteInfo, Summary,
-        Timing, VERSION,
-    },
+    record::{CaseRecord, JudgeRecord, RecordFolder, RegionQ, SceneRecord, Timing},
     render::{Frame, Geometry, Job, Loaded, RenderError, Renderer, gbuffer::GBuffer, path},
     scenes::{Scene, View},
     stats::{Estimate, mean_variance},
-    suite::{Case, Plan, Suite},
+    suite::{Case, Plan},
 };
 use std::{collections::BTreeMap, time::Instant};
-
-/// Images of one scene that are held at once, at most.
-const MAX_GIB: f64 = 8.0;
 
 /// Paths a pixel that look for any light at all.
 const LIGHT_PATHS: u32 = 4;
@@ -38,211 +33,8 @@ const CONVERGED: u32 = 0x00c0_0000;
 const JUDGE: u32 = 0x0010_0000;
 const LOOK: u32 = 0x0001_0000;
 
-/// Why a run ended without a record.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// A file could not be written.
-    #[error(transparent)]
-    Disk(#[from] DiskError),
-    /// The CPU reference could not render, so there is nothing to compare with.
-    #[error("scene '{scene}': {source}")]
-    Render {
-        /// The scene.
-        scene: String,
-        /// Why.
-        source: RenderError,
-    },
-    /// The measure view of a scene looks at the occluder.
-    #[error("scene '{scene}': the measure view sees the occluder '{object}'; measure.clearance must end under it")]
-    SeesOccluder {
-        /// The scene.
-        scene: String,
-        /// The object it sees.
-        object: String,
-    },
-    /// No light reaches the receiver, so there is nothing to judge.
-    #[error(
-        "scene '{scene}': no light reaches the receiver even without the occluder; check environment and the openings towards it"
-    )]
-    NoLight {
-        /// The scene.
-        scene: String,
-    },
-    /// The images of a scene would not fit into memory.
-    #[error(
-        "scene '{scene}': its cases would hold {gib:.1} GiB of images at once, more than {MAX_GIB} GiB; lower replicates or measure.resolution"
-    )]
-    TooMuch {
-        /// The scene.
-        scene: String,
-        /// What it would need.
-        gib: f64,
-    },
-    /// The measure view of a scene sees nothing.
-    #[error(
-        "scene '{scene}': the measure view sees no surface; check measure.center, measure.normal and measure.clearance"
-    )]
-    SeesNothing {
-        /// The scene.
-        scene: String,
-    },
-}
-
-/// What a run tells about itself on the way.
-pub trait Observer {
-    /// `done` of `total` steps are done, and `what` comes next.
-    fn step(&self, done: usize, total: usize, what: &str);
-}
-
-/// How many steps a plan has: each case, each converged image, the judge and the
-/// pictures of each scene.
-pub fn steps(plan: &Plan<'_>) -> usize {
-    let per_scene = plan.suite.methods.len() + 2;
-    plan.cases.len() + plan.suite.scenes.len() * per_scene
-}
-
-/// A plan whose scenes are loaded and checked. Whatever a scene file gets wrong
-/// is found here, before anything is written.
-pub struct Prepared<'a> {
-    plan: &'a Plan<'a>,
-    sets: Vec<Set<'a>>,
-}
-
-impl<'a> Prepared<'a> {
-    /// Builds the trees, sees what the measure views see, finds the regions, and
-    /// makes sure that light reaches what is to be judged.
-    ///
-    /// # Errors
-    /// [`RunError`], which names the scene and the field.
-    pub fn new(plan: &'a Plan<'a>) -> Result<Self, RunError> {
-        let sets = plan.suite.scenes.iter().map(|scene| Set::new(plan, scene)).collect::<Result<_, _>>()?;
-        Ok(Prepared { plan, sets })
-    }
-
-    /// Runs the plan and commits its record.
-    ///
-    /// A case whose renderer fails ends with its error; the others go on. `gpu`
-    /// is used for the plan's cases on `gpu`.
-    ///
-    /// # Errors
-    /// Where a file cannot be written, or the CPU reference fails.
-    pub fn run(
-        &self,
-        cpu: &dyn Renderer,
-        gpu: Option<&dyn Renderer>,
-        machine: Machine,
-        folder: &RecordFolder,
-        observer: &dyn Observer,
-    ) -> Result<Record, RunError> {
-        let plan = self.plan;
-        let start = Instant::now();
-        let mut timing = Timing {
-            began: jiff::Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string(),
-            threads: rayon::current_num_threads(),
-            ..Timing::default()
-        };
-        let mut progress = Progress { observer, done: 0, total: steps(plan) };
-        let (mut scenes, mut cases) = (Vec::new(), Vec::new());
-        for set in &self.sets {
-            let (scene_record, case_records) = set.run(cpu, gpu, folder, &mut progress, &mut timing)?;
-            scenes.push(scene_record);
-            cases.extend(case_records);
-        }
-        timing.seconds = start.elapsed().as_secs_f64();
-        let (verdicts, idle_gates) = verdicts(plan, &machine, &scenes, &cases);
-        let record = Record {
-            version: VERSION,
-            tool: env!("CARGO_PKG_VERSION").to_owned(),
-            suite: suite_info(plan.suite),
-            seed: plan.seed,
-            machine,
-            summary: Summary::new(&verdicts, &idle_gates, &cases),
-            verdicts,
-            idle_gates,
-            scenes,
-            cases,
-            timing,
-        };
-        folder.commit(&record)?;
-        Ok(record)
-    }
-}
-
-fn suite_info(suite: &Suite) -> SuiteInfo {
-    SuiteInfo {
-        name: suite.name.clone(),
-        description: suite.file.description.clone(),
-        replicates: suite.file.replicates.get(),
-        converged_rays: suite.file.converged_rays.get(),
-        golden_rays: suite.file.golden_rays.map(crate::suite::Rays::get),
-        estimators: suite.methods.iter().map(|m| m.name.clone()).collect(),
-        methods: suite.methods.iter().map(|m| (m.name.clone(), m.estimator)).collect(),
-        classic: suite.methods[suite.classic()].name.clone(),
-    }
-}
-
-/// Holds every gate against every case it applies to. Failures come first.
-fn verdicts(
-    plan: &Plan<'_>,
-    machine: &Machine,
-    scenes: &[SceneRecord],
-    cases: &[CaseRecord],
-) -> (Vec<Verdict>, Vec<IdleGate>) {
-    let (mut verdicts, mut idle) = (Vec::new(), Vec::new());
-    let no_gpu = !plan.cases.iter().any(|c| c.renderer == "gpu");
-    for gate in &plan.suite.gates {
-        let before = verdicts.len();
-        for scene in scenes.iter().filter(|s| gate.applies_to_judge(&s.name)) {
-            let metric = match &scene.judge {
-                Some(judge) => judge.contrast.clone(),
-                None => Metric::new(gate.metric, None, Err(Absent(scene.no_judge.clone().unwrap_or_default()))),
-            };
-            verdicts.push(gate.verdict(&scene.name, None, &metric));
-        }
-        for record in cases.iter().filter(|c| gate.applies_to(&c.case)) {
-            if let Some(metric) = record.metric(gate.metric, gate.region) {
-                verdicts.push(gate.verdict(&record.case.scene, Some(&record.case), metric));
-            }
-        }
-        let excused = no_gpu && !gate.renderers.is_empty() && gate.renderers.iter().all(|r| r == "gpu");
-        if excused {
-            let reason = format!("this run used no GPU: {}", machine.gpu);
-            idle.push(IdleGate { gate: gate.name.clone(), reason, excused });
-        } else if verdicts.len() == before {
-            let reason = "no case of this run has this metric".to_owned();
-            idle.push(IdleGate { gate: gate.name.clone(), reason, excused });
-        } else {
-            // A scene that the gate names must not drop out of it unseen.
-            for scene in &gate.scenes {
-                if !verdicts[before..].iter().any(|v: &Verdict| v.scene == *scene) {
-                    let absent = Absent("no case of this scene has this metric".into());
-                    verdicts.push(gate.verdict(scene, None, &Metric::new(gate.metric, gate.region, Err(absent))));
-                }
-            }
-        }
-    }
-    verdicts.sort_by_key(|v| v.outcome);
-    (verdicts, idle)
-}
-
-struct Progress<'a> {
-    observer: &'a dyn Observer,
-    done: usize,
-    total: usize,
-}
-
-impl Progress<'_> {
-    fn begin(&self, what: &str) {
-        self.observer.step(self.done, self.total, what);
-    }
-
-    fn end(&mut self) {
-        self.done += 1;
-    }
-}
-
 /// One scene made ready: geometry, twin, what the measure view sees.
-struct Set<'a> {
+pub(super) struct Set<'a> {
     plan: &'a Plan<'a>,
     scene: &'a Scene,
     geometry: Geometry,
@@ -270,7 +62,7 @@ struct Images {
 }
 
 impl<'a> Set<'a> {
-    fn new(plan: &'a Plan<'a>, scene: &'a Scene) -> Result<Self, RunError> {
+    pub(super) fn new(plan: &'a Plan<'a>, scene: &'a Scene) -> Result<Self, RunError> {
         let name = || scene.name.clone();
         let view = scene.measure.view();
         let cases = plan.cases.iter().filter(|c| c.scene == scene.name).count();
@@ -303,7 +95,7 @@ impl<'a> Set<'a> {
         Ok(Set { plan, scene, geometry, twin, view, gbuffer, regions })
     }
 
-    fn run(
+    pub(super) fn run(
         &self,
         cpu: &dyn Renderer,
         gpu: Option<&dyn Renderer>,
@@ -601,40 +393,6 @@ impl<'a> Set<'a> {
             look,
         })
     }
-}
-
-/// What a case is compared with, where it is there.
-struct Others<'a> {
-    classic: Option<Measured<'a>>,
-    cpu: Option<&'a [Vec<f32>]>,
-    judge: Result<&'a Judge, Absent>,
-    /// Whether the scene has an occluder, so that it should have a judge.
-    occluder: bool,
-}
-
-/// Every metric of one case.
-fn metrics(method: &Measured<'_>, others: &Others<'_>) -> Vec<Metric> {
-    let mut metrics = error::openness(method);
-    metrics.extend(error::against_converged(method, Region::All));
-    if others.occluder {
-        let judge = others.judge.clone();
-        metrics.extend(method.contrasts());
-        metrics.push(method.contrast_error(judge.clone()));
-        if let Some(classic) = &others.classic {
-            metrics.push(method.removed(classic, judge.clone()));
-        }
-        for region in Judge::REGIONS {
-            metrics.extend(error::against_converged(method, region));
-            metrics.extend(error::against_judge(method, judge.clone(), region));
-        }
-    }
-    if let Some(classic) = &others.classic {
-        metrics.push(error::over_darkening(method, classic));
-    }
-    if let Some(cpu) = others.cpu {
-        metrics.push(error::renderer_difference(method.replicates, cpu, method.regions));
-    }
-    metrics
 }
 
 /// A ratio with its interval, where that is known.
