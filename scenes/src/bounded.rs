@@ -28,10 +28,7 @@ macro_rules! bounded {
                 if holds(value) {
                     Ok(Self(value))
                 } else {
-                    Err(D::Error::custom(format!(
-                        "{value} is out of range: it must be {}",
-                        $range
-                    )))
+                    Err(out_of_range(value, $range))
                 }
             }
         }
@@ -76,12 +73,16 @@ macro_rules! ranged {
 
         impl<'de, const MIN: $bound, const MAX: $bound> Deserialize<'de> for $name<MIN, MAX> {
             fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-                let value = finite(d)?;
+                // The range leaves out what is not finite, and its message says more
+                // than that.
+                let given = f64::deserialize(d)?;
+                let value = given as f32;
                 let (min, max) = (MIN as f32 / $unit, MAX as f32 / $unit);
                 if (min..=max).contains(&value) {
                     Ok(Self(value))
                 } else {
-                    Err(out_of_range(value, format_args!("from {min} to {max}{}", $suffix)))
+                    let kind = if given.is_finite() { "" } else { "a finite number " };
+                    Err(out_of_range(given, format_args!("{kind}from {min} to {max}{}", $suffix)))
                 }
             }
         }

@@ -49,7 +49,7 @@ pub(super) fn build(triangles: &[[Vec3; 3]], pad: f32) -> (Vec<Node>, Vec<u32>) 
 }
 
 /// Levels of a tree.
-pub(super) fn depth(nodes: &[Node]) -> usize {
+fn depth(nodes: &[Node]) -> usize {
     let mut deepest = 0;
     let mut stack = if nodes.is_empty() { vec![] } else { vec![(0u32, 1usize)] };
     while let Some((index, level)) = stack.pop() {

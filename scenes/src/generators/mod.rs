@@ -25,7 +25,7 @@ mod sphere;
 mod table;
 
 pub use arcade::Arcade;
-pub use atrium::{Atrium, Span, Whole};
+pub use atrium::Atrium;
 pub use banner::Banner;
 pub use blinds::Blinds;
 pub use block::Block;

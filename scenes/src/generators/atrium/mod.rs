@@ -9,17 +9,17 @@ mod arches;
 mod cloth;
 mod columns;
 mod plan;
-mod ranges;
 mod shell;
 mod sink;
 #[cfg(test)]
 mod tests;
 mod vaults;
 
-pub use ranges::{Span, Whole};
-
 use super::Part;
-use crate::{Material, bounded::NonNegative};
+use crate::{
+    Material,
+    bounded::{Count, Length, NonNegative},
+};
 use plan::{Plan, STOREYS};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -36,29 +36,29 @@ const CLOTH: [f32; 2] = [0.001, 0.02];
 pub struct Atrium {
     /// How many triangles to aim at, to within a tenth: 10 000 to 10 000 000,
     /// from 16 000 with more bays than the defaults; 250 000 unless given.
-    pub triangles: Whole<10_000, 10_000_000>,
+    pub triangles: Count<10_000, 10_000_000>,
     /// From the floor to the hem of the curtains, metres; 0.03 unless given.
-    pub hem_gap: Span<2, 500>,
+    pub hem_gap: Length<2, 500>,
     /// From the crest of a pleat to its trough, at the hem, metres; 0.12 unless given.
-    pub pleat_depth: Span<0, 300>,
+    pub pleat_depth: Length<0, 300>,
     /// Thickness of curtains and banners, metres; 0, a single sheet, unless
     /// given, else 0.001 to 0.02.
     pub cloth_thickness: NonNegative,
     /// Arches along each long side of the courtyard; 7 unless given.
-    pub bays_long: Whole<5, 10>,
+    pub bays_long: Count<5, 10>,
     /// Arches along each short side of the courtyard; 3 unless given.
-    pub bays_short: Whole<3, 4>,
+    pub bays_short: Count<3, 4>,
 }
 
 impl Default for Atrium {
     fn default() -> Self {
         Atrium {
-            triangles: Whole(250_000),
-            hem_gap: Span(0.03),
-            pleat_depth: Span(0.12),
+            triangles: Count(250_000),
+            hem_gap: Length(0.03),
+            pleat_depth: Length(0.12),
             cloth_thickness: NonNegative(0.0),
-            bays_long: Whole(7),
-            bays_short: Whole(3),
+            bays_long: Count(7),
+            bays_short: Count(3),
         }
     }
 }

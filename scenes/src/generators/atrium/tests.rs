@@ -6,7 +6,7 @@ use glam::Vec3;
 use std::collections::HashMap;
 
 fn atrium(triangles: u32) -> Atrium {
-    Atrium { triangles: Whole(triangles), ..Atrium::default() }
+    Atrium { triangles: Count(triangles), ..Atrium::default() }
 }
 
 fn total(parts: &[Part]) -> usize {
@@ -70,9 +70,9 @@ fn the_count_is_within_a_tenth_of_the_target() {
             atrium.fit().unwrap_or_else(|e| panic!("{e}"));
         }
     }
-    let most = Atrium { bays_long: Whole(10), bays_short: Whole(4), ..atrium(10_000) };
+    let most = Atrium { bays_long: Count(10), bays_short: Count(4), ..atrium(10_000) };
     assert!(most.parts().unwrap_err().contains("bays_long"));
-    assert!(Atrium { triangles: Whole(20_000), ..most }.parts().is_ok());
+    assert!(Atrium { triangles: Count(20_000), ..most }.parts().is_ok());
 }
 
 #[test]
@@ -134,7 +134,7 @@ fn the_same_parameters_make_the_same_house() {
 #[test]
 fn hems_hang_where_they_are_told() {
     for gap in [0.03, 0.1] {
-        let atrium = Atrium { hem_gap: Span(gap), ..atrium(50_000) };
+        let atrium = Atrium { hem_gap: Length(gap), ..atrium(50_000) };
         let mut curtains = 0;
         for part in atrium.parts().unwrap() {
             assert_eq!(part.occluder, part.name.starts_with("curtain-") || part.name.starts_with("banner-"));
