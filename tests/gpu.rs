@@ -12,11 +12,8 @@ fn gpu() -> Gpu {
     Gpu::open().unwrap_or_else(|e| panic!("{e}"))
 }
 
-const ESTIMATORS: [Estimator; 3] = [
-    Estimator::Classic,
-    Estimator::Extended { receiver_plane: ReceiverPlane::Counts },
-    Estimator::Extended { receiver_plane: ReceiverPlane::Clipped },
-];
+const ESTIMATORS: [Estimator; 3] =
+    [Estimator::CLASSIC, Estimator::extended(ReceiverPlane::Counts), Estimator::extended(ReceiverPlane::Clipped)];
 
 #[derive(Default, Debug)]
 struct Tally {
@@ -31,7 +28,7 @@ impl Tally {
     /// Counts rays that were decided differently, in pixels that see the same
     /// triangle.
     fn add(&mut self, cpu: &Frame, gpu: &Frame, job: &Job<'_>) {
-        let secondary = if job.estimator == Estimator::Classic { 0 } else { 2 };
+        let secondary = if job.estimator == Estimator::CLASSIC { 0 } else { 2 };
         let (a, b) = (cpu.decisions.as_ref().unwrap(), gpu.decisions.as_ref().unwrap());
         for i in 0..cpu.values.len() {
             self.pixels += 1;

@@ -1,7 +1,7 @@
 //! The CPU renderer against closed forms and quadrature: openness of single
 //! points statistically, highlight contrast by rendering.
 
-#![allow(missing_docs, clippy::unwrap_used)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
 
 use aogauge::{
     flatland::Slab,
@@ -10,7 +10,8 @@ use aogauge::{
         regions::Regions,
     },
     render::{
-        Estimator, Geometry, Job, ReceiverPlane, Renderer, ao::Shading, cpu::Cpu, gbuffer::GBuffer, sampler::Sampler,
+        Estimator, Geometry, Job, Openness, ReceiverPlane, Renderer, ao::Shading, cpu::Cpu, gbuffer::GBuffer,
+        sampler::Sampler,
     },
     scenes::Scene,
     stats::{Estimate, sidak_alpha, upper_tail},
@@ -19,9 +20,9 @@ use aogauge::{
 use glam::Vec3;
 use serde_json::Value;
 
-const CLASSIC: Estimator = Estimator::Classic;
-const CLIPPED: Estimator = Estimator::Extended { receiver_plane: ReceiverPlane::Clipped };
-const COUNTS: Estimator = Estimator::Extended { receiver_plane: ReceiverPlane::Counts };
+const CLASSIC: Estimator = Estimator::CLASSIC;
+const CLIPPED: Estimator = Estimator::extended(ReceiverPlane::Clipped);
+const COUNTS: Estimator = Estimator::extended(ReceiverPlane::Counts);
 
 /// Column of the reference, estimator, R'/R.
 const METHODS: [(&str, Estimator, f32); 5] = [
@@ -31,6 +32,13 @@ const METHODS: [(&str, Estimator, f32); 5] = [
     ("ext2_c_R4_g0", CLIPPED, 0.25),
     ("ext2_c_R4_g1", COUNTS, 0.25),
 ];
+
+fn method(estimator: Estimator) -> Openness {
+    match estimator {
+        Estimator::Openness(method) => method,
+        other => panic!("{other:?} is not openness"),
+    }
+}
 
 fn reference(text: &str) -> Vec<Value> {
     let all: Value = serde_json::from_str(text).unwrap();
@@ -65,14 +73,10 @@ shape = {{ curtain = {{ thickness = {w}, gap = {m}, height = 1.0, length = 6.0 }
 fn render_point(geometry: &Geometry, scene: &Scene, t: f32, estimator: Estimator, ratio: f32, salt: u32) -> Estimate {
     let mut ao = scene.ao;
     ao.secondary_radius = ratio * ao.radius;
-    let shading = Shading::new(&geometry.tracer, Vec3::new(t, 0.0, 0.1), Vec3::Y, ao, estimator);
+    let shading = Shading::new(&geometry.tracer, Vec3::new(t, 0.0, 0.1), Vec3::Y, ao, method(estimator));
     let rays = 512;
-    let values: Vec<f64> = (0..64)
-        .map(|replicate| {
-            let (halves, _) = shading.open_halves(rays, &Sampler::new(11, salt, replicate));
-            f64::from(halves) / f64::from(2 * rays)
-        })
-        .collect();
+    let values: Vec<f64> =
+        (0..64).map(|replicate| f64::from(shading.openness(rays, &Sampler::new(11, salt, replicate)).0)).collect();
     Estimate::of_mean(&values)
 }
 
@@ -94,10 +98,9 @@ fn mistaken(shading: &Shading<'_>, geometry: &Geometry, t: f32, ratio: f32, mist
             let [u, v] = sampler.pair(i, 0);
             if mistake == Mistake::Uniform {
                 // cos(theta) = 1 - u in place of its square root.
-                let [primary, first, second] = shading.decide([1.0 - (1.0 - u) * (1.0 - u), v]);
-                return if primary { 0 } else { 2 - u32::from(first) - u32::from(second) };
+                return (2.0 * shading.decide([1.0 - (1.0 - u) * (1.0 - u), v], [0.0; 2]).weight()) as u32;
             }
-            if shading.decide([u, v])[0] {
+            if shading.decide([u, v], [0.0; 2]).hit {
                 return 0;
             }
             let (radius, n) = (0.25, Vec3::Y);
@@ -128,7 +131,7 @@ fn a_one_sided_ray_and_a_wrong_cosine_are_found() {
             let scene = scene(row);
             let geometry = Geometry::new(&scene).unwrap();
             let t = row["t"].as_f64().unwrap() as f32 / 100.0;
-            let shading = Shading::new(&geometry.tracer, Vec3::new(t, 0.0, 0.1), Vec3::Y, scene.ao, estimator);
+            let shading = Shading::new(&geometry.tracer, Vec3::new(t, 0.0, 0.1), Vec3::Y, scene.ao, method(estimator));
             let values: Vec<f64> = (0..64)
                 .map(|replicate| mistaken(&shading, &geometry, t, 0.25, mistake, (r * 64 + replicate) as u32))
                 .collect();

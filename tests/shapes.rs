@@ -28,7 +28,7 @@ fn every_legal_parameter_set_gives_a_scene_that_renders() {
                 scene.ao.secondary_radius = 0.25;
                 let geometry = Geometry::new(&scene).unwrap_or_else(|e| panic!("{family}: {text}: {e}"));
                 let view = scene.look.view();
-                let estimator = Estimator::Extended { receiver_plane: ReceiverPlane::Clipped };
+                let estimator = Estimator::extended(ReceiverPlane::Clipped);
                 let job = Job { view: &view, estimator, ao: scene.ao, rays: 2, seed: 1, replicate: 0 };
                 let frame = Cpu.load(&geometry).unwrap().render(&job).unwrap();
                 assert!(frame.values.iter().all(|v| v.is_nan() || (0.0..=1.0).contains(v)), "{family}: {text}");

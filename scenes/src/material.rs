@@ -55,8 +55,9 @@ impl Material {
         Material { base_color, ..Material::default() }
     }
 
-    /// Diffuse albedo by luminance, without the texture, at most [`MAX_ALBEDO`].
-    pub fn albedo(&self) -> f32 {
-        (luminance(self.base_color) * (1.0 - self.metallic)).clamp(0.0, MAX_ALBEDO)
+    /// Linear diffuse albedo a channel, without the texture, each at most
+    /// [`MAX_ALBEDO`].
+    pub fn albedo(&self) -> [f32; 3] {
+        self.base_color.map(|c| (c * (1.0 - self.metallic)).clamp(0.0, MAX_ALBEDO))
     }
 }

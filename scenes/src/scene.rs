@@ -1,6 +1,6 @@
 //! A scene: objects, light, scale and views.
 
-use crate::{Camera, Environment, Light, LightKind, LookView, Material, MeasureView, Mesh, Sky};
+use crate::{Camera, Environment, Light, LightKind, LookView, Material, MeasureView, Mesh, Sky, luminance};
 use glam::Vec3;
 use sha2::{Digest, Sha256};
 
@@ -101,7 +101,12 @@ impl Scene {
             floats(&light_numbers(light));
         }
         for o in &self.objects {
-            floats(&[o.material.albedo(), f32::from(u8::from(o.occluder))]);
+            let [r, g, b] = o.material.albedo();
+            floats(&[luminance([r, g, b])]);
+            if r != g || g != b {
+                floats(&[r, g, b]);
+            }
+            floats(&[f32::from(u8::from(o.occluder))]);
             if o.material.emissive != [0.0; 3] {
                 floats(&o.material.emissive);
             }

@@ -1,7 +1,9 @@
-//! Openness, ray by ray: `classic` and `extended`. Twin: `gpu/shaders/ao.wgsl`.
+//! Openness, ray by ray: `classic`, `obscurance`, `extended`,
+//! `extended-obscurance`. Twin, for `classic` and the paper's `extended`:
+//! `gpu/shaders/ao.wgsl`.
 
 use super::{
-    Estimator, ReceiverPlane,
+    Extension, Faces, Falloff, Openness, ReceiverPlane, SecondaryOrigin, Sides,
     sampler::{Sampler, turn},
 };
 use crate::trace::{Ray, Tracer};
@@ -12,12 +14,35 @@ use glam::Vec3;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Decisions {
-    /// The primary ray is closed.
+    /// The primary ray meets something within reach.
     pub primary: u32,
     /// The first secondary ray is closed.
     pub first: u32,
     /// The second secondary ray is closed.
     pub second: u32,
+}
+
+/// What became of one primary ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Decided {
+    /// Whether it meets something within reach.
+    pub hit: bool,
+    /// mu of its first hit; 1 without one.
+    pub mu: f32,
+    /// Which secondary rays are closed, a bit each.
+    pub closed: u32,
+    /// How many secondary rays the method casts; 0 without extension.
+    pub secondary_rays: u32,
+}
+
+impl Decided {
+    /// What the ray counts, in [0, 1]: mu (1 - closed / secondary rays).
+    pub fn weight(self) -> f32 {
+        match self.secondary_rays {
+            0 => self.mu,
+            n => self.mu * ((n - self.closed.count_ones()) as f32 / n as f32),
+        }
+    }
 }
 
 /// Two unit tangents that make a right-handed frame with a unit normal (Duff et
@@ -29,6 +54,13 @@ pub fn tangents(n: Vec3) -> [Vec3; 2] {
     [Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), Vec3::new(b, sign + n.y * n.y * a, -n.y)]
 }
 
+/// Whether a triangle turns its front, from where its corners run
+/// counter-clockwise, against a direction.
+fn faces(corners: &[Vec3; 3], direction: Vec3) -> bool {
+    let [a, b, c] = corners;
+    (*b - *a).cross(*c - *a).dot(direction) < 0.0
+}
+
 /// A shaded point with what its rays share.
 #[derive(Clone, Copy, Debug)]
 pub struct Shading<'a> {
@@ -38,65 +70,132 @@ pub struct Shading<'a> {
     normal: Vec3,
     frame: [Vec3; 2],
     ao: AoScale,
-    estimator: Estimator,
+    method: Openness,
 }
 
 impl<'a> Shading<'a> {
-    /// A point on a surface with its unit normal.
-    pub fn new(tracer: &'a Tracer, point: Vec3, normal: Vec3, ao: AoScale, estimator: Estimator) -> Self {
-        Shading { tracer, origin: point + normal * tracer.offset(), normal, frame: tangents(normal), ao, estimator }
+    /// A point on a surface with its unit normal. `ao` is the scene's; a method
+    /// with a scale of its own overrides it.
+    pub fn new(tracer: &'a Tracer, point: Vec3, normal: Vec3, ao: AoScale, method: Openness) -> Self {
+        let origin = point + normal * tracer.offset();
+        Shading { tracer, origin, normal, frame: tangents(normal), ao: method.scale.on(ao), method }
     }
 
-    /// Decides one primary ray: which of primary, first and second secondary ray
-    /// are closed.
+    /// Decides one primary ray. `place` chooses its direction; `shift`, in
+    /// [0, 1), the origin of secondary rays along it and how their fan is turned,
+    /// where the method leaves that to chance.
     #[inline]
-    pub fn decide(&self, [u, v]: [f32; 2]) -> [bool; 3] {
+    pub fn decide(&self, [u, v]: [f32; 2], shift: [f32; 2]) -> Decided {
         let [cos_phi, sin_phi] = turn(v);
         let (sin_theta, cos_theta) = (u.sqrt(), (1.0 - u).sqrt());
         let [t, b] = self.frame;
         // The direction in the plane of the surface, and across it.
         let along = t * cos_phi + b * sin_phi;
         let w = along * sin_theta + self.normal * cos_theta;
-        if self.tracer.occluded(&Ray::new(self.origin, w, self.ao.radius)) {
-            return [true, false, false];
+        let (hit, mu, length) = self.primary(w);
+        let Some(extension) = self.method.extension else {
+            return Decided { hit, mu, closed: 0, secondary_rays: 0 };
+        };
+        let mut decided = Decided { hit, mu, closed: 0, secondary_rays: extension.secondary_rays };
+        if mu > 0.0 {
+            // d1 = w x n / |w x n| and d2 = w x d1, written out in the frame of
+            // the surface: there d1 has no singularity where w is parallel to n.
+            let d1 = t * sin_phi - b * cos_phi;
+            let d2 = along * cos_theta - self.normal * sin_theta;
+            let share = if extension.origin == SecondaryOrigin::Jittered { shift[0] } else { 0.5 };
+            let fan = Fan {
+                middle: self.origin + w * (share * length),
+                height: share * length * cos_theta,
+                sin_theta,
+                directions: [d1, d2],
+            };
+            for i in 0..extension.secondary_rays {
+                let ray = fan.ray(i, shift[1], extension, self.ao.secondary_radius);
+                decided.closed |= u32::from(self.occluded(&ray)) << i;
+            }
         }
-        let Estimator::Extended { receiver_plane } = self.estimator else {
-            return [false; 3];
-        };
-        // d1 = w x n / |w x n| and d2 = w x d1, written out in the frame of the
-        // surface: there d1 has no singularity where w is parallel to n.
-        let d1 = t * sin_phi - b * cos_phi;
-        let d2 = along * cos_theta - self.normal * sin_theta;
-        let reach = self.ao.secondary_radius;
-        let middle = self.origin + w * (0.5 * self.ao.radius);
-        let height = 0.5 * self.ao.radius * cos_theta;
-        // How far down d2 goes before it meets the tangent plane.
-        let down = match receiver_plane {
-            ReceiverPlane::Clipped if reach * sin_theta > height => height / sin_theta,
-            _ => reach,
-        };
-        let first = Ray::new(middle - d1 * reach, d1, 2.0 * reach);
-        let second = Ray::new(middle - d2 * reach, d2, reach + down);
-        [false, self.tracer.occluded(&first), self.tracer.occluded(&second)]
+        decided
     }
 
-    /// Openness in half rays: 2 for an open primary ray, less 1 for each closed
-    /// secondary ray, over `rays` rays. Openness is this over `2 * rays`.
-    pub fn open_halves(&self, rays: u32, sampler: &Sampler) -> (u32, Decisions) {
-        let mut halves = 0;
+    /// Whether a primary ray meets something, its mu, and how much of R it has
+    /// before that.
+    #[inline]
+    fn primary(&self, w: Vec3) -> (bool, f32, f32) {
+        let radius = self.ao.radius;
+        let falloff = self.method.falloff;
+        let ray = Ray::new(self.origin, w, falloff.reach(radius));
+        if falloff == Falloff::Step {
+            let hit = self.occluded(&ray);
+            return (hit, f32::from(u8::from(!hit)), radius);
+        }
+        let distance = match self.method.faces {
+            Faces::Both => self.tracer.distance(&ray, |_| true),
+            Faces::Front => self.tracer.distance(&ray, |corners| faces(corners, w)),
+        };
+        distance.map_or((false, 1.0, radius), |d| (true, falloff.mu(d, radius), d.min(radius)))
+    }
+
+    #[inline]
+    fn occluded(&self, ray: &Ray) -> bool {
+        match self.method.faces {
+            Faces::Both => self.tracer.occluded(ray),
+            Faces::Front => self.tracer.occluded_by(ray, |corners| faces(corners, ray.direction)),
+        }
+    }
+
+    /// Openness over `rays` rays, and how each was decided.
+    pub fn openness(&self, rays: u32, sampler: &Sampler) -> (f32, Decisions) {
+        let chance = self.method.extension.is_some_and(|e| e.is_turned() || e.origin == SecondaryOrigin::Jittered);
+        let mut sum = 0.0;
         let mut decisions = Decisions::default();
         for i in 0..rays {
-            let [primary, first, second] = self.decide(sampler.pair(i, 0));
-            if !primary {
-                halves += 2 - u32::from(first) - u32::from(second);
-            }
+            let shift = if chance { sampler.pair(i, 1) } else { [0.0; 2] };
+            let decided = self.decide(sampler.pair(i, 0), shift);
+            sum += f64::from(decided.weight());
             if i < 32 {
-                decisions.primary |= u32::from(primary) << i;
-                decisions.first |= u32::from(first) << i;
-                decisions.second |= u32::from(second) << i;
+                decisions.primary |= u32::from(decided.hit) << i;
+                decisions.first |= (decided.closed & 1) << i;
+                decisions.second |= (decided.closed >> 1 & 1) << i;
             }
         }
-        (halves, decisions)
+        let mean = sum / f64::from(rays);
+        let intensity = self.method.intensity;
+        (if intensity == 1.0 { mean as f32 } else { mean.powf(f64::from(intensity)) as f32 }, decisions)
+    }
+}
+
+/// The secondary rays of one primary ray.
+struct Fan {
+    /// Where they start.
+    middle: Vec3,
+    /// Of that over the receiver's tangent plane.
+    height: f32,
+    /// Of the primary ray against the normal.
+    sin_theta: f32,
+    /// d1 and d2.
+    directions: [Vec3; 2],
+}
+
+impl Fan {
+    /// Secondary ray `i`: at an angle from d1 towards d2 of i/n of a half turn,
+    /// of a whole turn where rays go one way.
+    #[inline]
+    fn ray(&self, i: u32, turned: f32, extension: Extension, reach: f32) -> Ray {
+        let period = if extension.sides == Sides::Two { 0.5 } else { 1.0 };
+        let turned = if extension.is_turned() { turned } else { 0.0 };
+        let [c, s] = turn((i as f32 + turned) * period / extension.secondary_rays as f32);
+        let [d1, d2] = self.directions;
+        let d = d1 * c + d2 * s;
+        // d2 goes down, against the normal, by sin(theta) a unit length.
+        let slope = s * self.sin_theta;
+        let forth = match extension.receiver_plane {
+            ReceiverPlane::Clipped if reach * slope > self.height => self.height / slope,
+            _ => reach,
+        };
+        match extension.sides {
+            Sides::Two => Ray::new(self.middle - d * reach, d, reach + forth),
+            Sides::One => Ray::new(self.middle, d, forth),
+        }
     }
 }
 
@@ -128,17 +227,25 @@ mod tests {
     #[test]
     fn an_empty_plane_reads_what_the_closed_form_says() {
         let tracer = plane(3.0);
-        for (ratio, expected) in [(0.25f32, 0.9), (0.125, 1.0 - 0.03125 / 1.0625)] {
+        for (ratio, expected) in [(0.25f32, 0.9f32), (0.125, 1.0 - 0.03125 / 1.0625)] {
             let ao = AoScale { radius: 0.25, secondary_radius: 0.25 * ratio };
-            let read = |estimator| {
-                let shading = Shading::new(&tracer, Vec3::new(0.1, 0.0, 0.2), Vec3::Y, ao, estimator);
-                let (halves, _) = shading.open_halves(65_536, &Sampler::new(1, 2, 3));
-                f64::from(halves) / 131_072.0
+            let read = |extension: Option<Extension>| {
+                let method = Openness { extension, ..Openness::plain(Falloff::Step) };
+                let shading = Shading::new(&tracer, Vec3::new(0.1, 0.0, 0.2), Vec3::Y, ao, method);
+                shading.openness(65_536, &Sampler::new(1, 2, 3)).0
             };
-            let extended = |receiver_plane| Estimator::Extended { receiver_plane };
-            assert!((read(Estimator::Classic) - 1.0).abs() < 1e-12);
-            assert!((read(extended(ReceiverPlane::Clipped)) - 1.0).abs() < 1e-12);
-            assert!((read(extended(ReceiverPlane::Counts)) - expected).abs() < 2e-3);
+            assert_eq!(read(None), 1.0);
+            for sides in [Sides::Two, Sides::One] {
+                for secondary_rays in [1, 2, 3, 8] {
+                    for origin in [SecondaryOrigin::Middle, SecondaryOrigin::Jittered] {
+                        let receiver_plane = ReceiverPlane::Clipped;
+                        let clipped = Extension { receiver_plane, secondary_rays, sides, origin };
+                        assert_eq!(read(Some(clipped)), 1.0, "{clipped:?}");
+                    }
+                }
+            }
+            let counts = read(Some(Extension::of_the_paper(ReceiverPlane::Counts)));
+            assert!((counts - expected).abs() < 2e-3, "{counts}");
         }
     }
 

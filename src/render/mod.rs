@@ -3,50 +3,33 @@
 
 pub mod ao;
 pub mod cpu;
+mod estimator;
 pub mod gbuffer;
 pub mod gpu;
+mod indirect;
+pub mod lights;
 pub mod path;
 pub mod sampler;
 
+pub use estimator::{
+    Estimator, Extension, Faces, Falloff, Kind, LocalIndirect, Openness, ReceiverPlane, Scale, SecondaryOrigin, Sides,
+};
+
 use crate::trace::Tracer;
-use aogauge_scenes::{AoScale, Environment, Scene, View, luminance};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-/// What happens when a secondary ray meets the receiver's own plane; the paper
-/// leaves it open, and it matters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum ReceiverPlane {
-    /// The literal reading: all geometry closes a secondary ray, the receiver
-    /// too. An empty plane then reads 1 - (k^2/2)/(1 + k^2) with k = 2R'/R.
-    Counts,
-    /// Secondary rays are cut at the receiver's tangent plane: an empty plane
-    /// reads 1.
-    Clipped,
-}
-
-/// How openness is computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Estimator {
-    /// O = share of N cosine-distributed primary rays with no hit within R.
-    Classic,
-    /// The paper's section 5: every open primary ray casts two secondary rays
-    /// about its middle and counts 1 - closed/2.
-    Extended {
-        /// Whether the receiver closes secondary rays.
-        receiver_plane: ReceiverPlane,
-    },
-}
+use aogauge_scenes::{AoScale, Environment, Scene, View};
+use glam::Vec3;
+use lights::Lights;
 
 /// One image: a value a pixel, row by row from the top left.
 #[derive(Clone, Debug)]
 pub struct Frame {
     /// Width and height in pixels.
     pub resolution: [u32; 2],
-    /// Openness in [0, 1]; NaN where the view meets no surface.
+    /// What the estimator computes, openness in [0, 1] or light by luminance; NaN
+    /// where the view meets no surface.
     pub values: Vec<f32>,
+    /// The same by linear red, green and blue, for estimators that know colour.
+    pub colors: Option<Vec<[f32; 3]>>,
     /// How each ray was decided, for up to 32 rays a pixel: see
     /// [`ao::Decisions`].
     pub decisions: Option<Vec<ao::Decisions>>,
@@ -80,13 +63,14 @@ pub struct Job<'a> {
 pub struct Geometry {
     /// The triangles.
     pub tracer: Tracer,
-    /// Diffuse albedo of each triangle, in the order of the scene.
-    pub albedo: Vec<f32>,
-    /// Luminance of the radiance each triangle sends out, from both sides;
-    /// empty where none does.
-    pub emission: Vec<f32>,
     /// The distant light.
     pub environment: Environment,
+    /// What can be aimed at.
+    pub lights: Lights,
+    /// Linear diffuse albedo of each triangle, in the order of the scene.
+    albedo: Vec<[f32; 3]>,
+    /// Radiance each triangle sends out, from both sides; empty where none does.
+    emission: Vec<[f32; 3]>,
 }
 
 /// Largest offset of ray origins that openness is still measured with, in R.
@@ -99,25 +83,30 @@ impl Geometry {
     /// [`RenderError::Rounding`] where the scene is so large for its R that
     /// rounding would show.
     pub fn new(scene: &Scene) -> Result<Self, RenderError> {
-        let (albedo, triangles): (Vec<f32>, Vec<_>) =
+        let (albedo, triangles): (Vec<[f32; 3]>, Vec<_>) =
             scene.triangles().map(|(object, corners)| (scene.objects[object].material.albedo(), corners)).unzip();
-        let mut emission: Vec<f32> =
-            scene.triangles().map(|(object, _)| luminance(scene.objects[object].material.emissive)).collect();
-        if emission.iter().all(|&e| e <= 0.0) {
-            emission.clear();
-        }
+        let lights = Lights::new(scene);
+        let emission = match lights.has_emitters() {
+            true => scene.triangles().map(|(object, _)| scene.objects[object].material.emissive).collect(),
+            false => Vec::new(),
+        };
         let tracer = Tracer::new(&triangles);
         let (offset, radius) = (tracer.offset(), scene.ao.radius);
         if offset > MAX_OFFSET * radius {
             let magnitude = offset * 2.0f32.powi(19);
             return Err(RenderError::Rounding { magnitude, radius, largest: MAX_OFFSET * radius * 2.0f32.powi(19) });
         }
-        Ok(Geometry { tracer, albedo, emission, environment: scene.environment.clone() })
+        Ok(Geometry { tracer, environment: scene.environment.clone(), lights, albedo, emission })
     }
 
-    /// Luminance of the radiance that a triangle sends out.
-    pub fn emitted(&self, triangle: u32) -> f32 {
-        self.emission.get(triangle as usize).copied().unwrap_or(0.0)
+    /// Linear diffuse albedo of a triangle: red, green and blue.
+    pub fn albedo(&self, triangle: u32) -> Vec3 {
+        Vec3::from(self.albedo[triangle as usize])
+    }
+
+    /// Radiance that a triangle sends out: red, green and blue.
+    pub fn emitted(&self, triangle: u32) -> Vec3 {
+        self.emission.get(triangle as usize).map_or(Vec3::ZERO, |e| Vec3::from(*e))
     }
 }
 
@@ -153,6 +142,16 @@ pub enum RenderError {
         radius: f32,
         /// The largest coordinate allowed, metres.
         largest: f32,
+    },
+    /// The renderer does not know the estimator.
+    #[error("the {renderer} renderer does not compute {kind:?} with these options yet; it knows {knows}")]
+    Unsupported {
+        /// `gpu`.
+        renderer: &'static str,
+        /// What was asked for.
+        kind: Kind,
+        /// What may be asked for.
+        knows: &'static str,
     },
     /// A GPU was asked for by name and there is none.
     #[error("no GPU adapter was found: {0}")]

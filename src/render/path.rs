@@ -1,156 +1,156 @@
 //! The judge's path tracer: irradiance from the scene's sky and lamps with diffuse
-//! interreflection, unbiased, without a radius.
+//! interreflection, unbiased, without a radius, by red, green and blue.
 //!
-//! Bounces are cosine distributed; where the scene names portals, each vertex
-//! also aims at one, and the two ways are weighted by the balance heuristic
-//! (Veach 1997, section 9.2). Either way a ray takes whatever it meets, sky or
-//! lamp, so a portal may mark a window or a lamp. Portals change the noise, never
-//! the mean.
+//! Bounces are cosine distributed. At each vertex, where the scene has them, the
+//! tracer also aims at a portal and at a surface that glows; whatever light may
+//! be found in several ways is weighted by the balance heuristic (Veach 1997,
+//! section 9.2). A portal may mark a window or a lamp: aiming at it takes whatever
+//! light lies behind. All of this changes the noise, never the mean. Punctual
+//! lights can only be aimed at.
 
 use super::{
     Geometry,
     ao::tangents,
     gbuffer::{FAR_AWAY, GBuffer},
+    lights::{Aim, lambert},
     sampler::{Sampler, turn},
 };
-use crate::trace::Ray;
+use crate::trace::{Hit, Ray};
+use aogauge_scenes::luminance;
 use glam::Vec3;
 use rayon::prelude::*;
+use std::f32::consts::PI;
 
 /// Bounces before Russian roulette begins.
 const SURE_BOUNCES: u32 = 3;
 
-/// Irradiance over pi at every surface of `gbuffer`, traced through `geometry`:
-/// 1 under an open sky of radiance 1. NaN where there is no surface.
+/// Pairs of random numbers a bounce.
+const PAIRS: u32 = 4;
+
+/// Irradiance over pi at every surface of `gbuffer`, traced through `geometry`,
+/// by luminance: 1 under an open sky of radiance 1. NaN where there is no
+/// surface.
 ///
 /// The surfaces need not be `geometry`'s own: the twin is traced from the points
 /// of the scene with its occluder, with the same random numbers.
 pub fn irradiance(geometry: &Geometry, gbuffer: &GBuffer, paths: u32, seed: u32, replicate: u32) -> Vec<f32> {
+    colors(geometry, gbuffer, paths, seed, replicate).into_iter().map(luminance).collect()
+}
+
+/// [`irradiance`] by linear red, green and blue.
+pub fn colors(geometry: &Geometry, gbuffer: &GBuffer, paths: u32, seed: u32, replicate: u32) -> Vec<[f32; 3]> {
     gbuffer
         .surfaces
         .par_iter()
         .enumerate()
         .with_min_len(32)
         .map(|(pixel, surface)| {
-            surface.map_or(f32::NAN, |s| {
+            surface.map_or([f32::NAN; 3], |s| {
                 let sampler = Sampler::new(seed, pixel as u32, replicate);
-                let sum: f64 = (0..paths).map(|i| path(geometry, s.point, s.normal, &sampler, i)).sum();
-                (sum / f64::from(paths)) as f32
+                let mut sum = glam::DVec3::ZERO;
+                for i in 0..paths {
+                    sum += path(geometry, s.point, s.normal, &sampler, i).as_dvec3();
+                }
+                (sum / f64::from(paths)).as_vec3().to_array()
             })
         })
         .collect()
 }
 
 /// One path from a surface to the light: an estimate of irradiance over pi.
-fn path(geometry: &Geometry, point: Vec3, normal: Vec3, sampler: &Sampler, index: u32) -> f64 {
-    let offset = geometry.tracer.offset();
+fn path(geometry: &Geometry, point: Vec3, normal: Vec3, sampler: &Sampler, index: u32) -> Vec3 {
+    let Geometry { tracer, lights, .. } = geometry;
     let (mut point, mut normal) = (point, normal);
-    let mut throughput = 1.0f64;
-    let mut sum = 0.0;
+    let mut throughput = Vec3::ONE;
+    let mut sum = Vec3::ZERO;
     for bounce in 0u32.. {
-        let origin = point + normal * offset;
-        sum += throughput * aimed(geometry, origin, normal, sampler.pair(index, 3 * bounce));
-        let [u, v] = sampler.pair(index, 3 * bounce + 1);
+        let origin = point + normal * tracer.offset();
+        let pair = |which: u32| sampler.pair(index, PAIRS * bounce + which);
+        let aims = [lights.aim_at_portal(origin, pair(0)), lights.aim_at_emitter(origin, pair(2))];
+        for aim in aims.into_iter().flatten() {
+            sum += throughput * aimed(geometry, origin, normal, aim);
+        }
+        let [survive, which] = pair(3);
+        if let Some(arrival) = lights.punctual(origin, which) {
+            sum += throughput * lambert(&arrival, tracer, origin, normal);
+        }
+        let [u, v] = pair(1);
         let [cos_phi, sin_phi] = turn(v);
         let [t, b] = tangents(normal);
         let cosine = (1.0 - u).sqrt();
         let direction = (t * cos_phi + b * sin_phi) * u.sqrt() + normal * cosine;
-        // The share that the bounce has in light which aiming could have found.
-        let weight = || {
-            let density = cosine / std::f32::consts::PI;
-            f64::from(density / (density + portal_density(geometry, origin, direction)))
-        };
-        let Some(hit) = geometry.tracer.closest(&Ray::new(origin, direction, FAR_AWAY)) else {
-            let sky = geometry.environment.sky.radiance(direction);
-            return sum + throughput * f64::from(sky) * weight();
-        };
-        let emitted = geometry.emitted(hit.triangle);
-        if emitted > 0.0 {
-            sum += throughput * f64::from(emitted) * weight();
+        let hit = tracer.closest(&Ray::new(origin, direction, FAR_AWAY));
+        let radiance = radiance(geometry, direction, hit.as_ref());
+        if radiance != Vec3::ZERO {
+            // The share that the bounce has in light which aiming could have found.
+            let own = cosine / PI;
+            let weight = own / (own + lights.density(tracer, origin, direction, hit.as_ref(), radiance));
+            sum += throughput * radiance * weight;
         }
-        let albedo = geometry.albedo[hit.triangle as usize];
-        if albedo <= 0.0 {
+        let Some(hit) = hit else {
+            return sum;
+        };
+        let albedo = geometry.albedo(hit.triangle);
+        throughput *= albedo;
+        let most = albedo.max_element();
+        if most <= 0.0 {
             return sum;
         }
-        throughput *= f64::from(albedo);
         if bounce >= SURE_BOUNCES {
             // Below 1 even for an albedo near 1, so that every path ends.
-            let survival = albedo.min(0.95);
-            if sampler.pair(index, 3 * bounce + 2)[0] >= survival {
+            let survival = most.min(0.95);
+            if survive >= survival {
                 return sum;
             }
-            throughput /= f64::from(survival);
+            throughput /= survival;
         }
         (point, normal) = (hit.point, hit.normal);
     }
     sum
 }
 
-/// Light that comes straight from or through a portal picked at random, weighted
-/// against the bounce that could have found it.
-fn aimed(geometry: &Geometry, origin: Vec3, normal: Vec3, [u, v]: [f32; 2]) -> f64 {
-    let portals = &geometry.environment.portals;
-    if portals.is_empty() {
-        return 0.0;
-    }
-    let stretched = u * portals.len() as f32;
-    let pick = (stretched as usize).min(portals.len() - 1);
-    let portal = &portals[pick];
-    let to = portal.corner + portal.u * (stretched - pick as f32) + portal.v * v - origin;
-    let Some(direction) = to.try_normalize() else {
-        return 0.0;
-    };
-    let cosine = normal.dot(direction);
+/// Light along a way that was aimed, weighted against the other ways to find it.
+fn aimed(geometry: &Geometry, origin: Vec3, normal: Vec3, aim: Aim) -> Vec3 {
+    let Geometry { tracer, lights, .. } = geometry;
+    let cosine = normal.dot(aim.direction);
     if cosine <= 0.0 {
-        return 0.0;
+        return Vec3::ZERO;
     }
-    let aimed = portal_density(geometry, origin, direction);
-    let bounced = cosine / std::f32::consts::PI;
-    if aimed <= 0.0 {
-        return 0.0;
-    }
-    let radiance = arriving(geometry, &Ray::new(origin, direction, FAR_AWAY));
-    f64::from(radiance) * f64::from(bounced / (aimed + bounced))
-}
-
-/// Radiance that arrives against a ray straight from a lamp or the sky.
-fn arriving(geometry: &Geometry, ray: &Ray) -> f32 {
-    let sky = geometry.environment.sky.radiance(ray.direction);
-    if geometry.emission.is_empty() {
+    let ray = Ray::new(origin, aim.direction, FAR_AWAY);
+    let hit = if aim.triangle.is_none() && !lights.has_emitters() {
         // Without lamps any hit will do, and costs less than the closest.
-        return if geometry.tracer.occluded(ray) { 0.0 } else { sky };
+        if tracer.occluded(&ray) {
+            return Vec3::ZERO;
+        }
+        None
+    } else {
+        tracer.closest(&ray)
+    };
+    if aim.triangle.is_some() && aim.triangle != hit.map(|h| h.triangle) {
+        return Vec3::ZERO;
     }
-    geometry.tracer.closest(ray).map_or(sky, |hit| geometry.emitted(hit.triangle))
+    let radiance = radiance(geometry, aim.direction, hit.as_ref());
+    let aimed = lights.density(tracer, origin, aim.direction, hit.as_ref(), radiance);
+    if aimed <= 0.0 {
+        return Vec3::ZERO;
+    }
+    let own = cosine / PI;
+    radiance * own / (aimed + own)
 }
 
-/// Density per solid angle with which aiming at a random point of a random
-/// portal picks this direction.
-fn portal_density(geometry: &Geometry, origin: Vec3, direction: Vec3) -> f32 {
-    let portals = &geometry.environment.portals;
-    let mut density = 0.0;
-    for p in portals {
-        let cross = p.u.cross(p.v);
-        let area = cross.length();
-        let plane = cross / area;
-        let slope = plane.dot(direction);
-        let t = plane.dot(p.corner - origin) / slope;
-        if !(t > 0.0 && t.is_finite()) {
-            continue;
-        }
-        let at = origin + direction * t - p.corner;
-        // Coordinates in the parallelogram, by Cramer's rule in its plane.
-        let a = at.cross(p.v).dot(cross) / (area * area);
-        let b = p.u.cross(at).dot(cross) / (area * area);
-        if (0.0..=1.0).contains(&a) && (0.0..=1.0).contains(&b) {
-            density += t * t / (slope.abs() * area);
-        }
+/// What a ray sees that met `hit`, or the sky: its own light, not what it
+/// reflects.
+fn radiance(geometry: &Geometry, direction: Vec3, hit: Option<&Hit>) -> Vec3 {
+    match hit {
+        Some(hit) => geometry.emitted(hit.triangle),
+        None => Vec3::splat(geometry.environment.sky.radiance(direction)),
     }
-    density / portals.len().max(1) as f32
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::lights::Lights;
     use aogauge_scenes::Scene;
 
     fn scene(objects: &str, portals: &str) -> Geometry {
@@ -171,7 +171,9 @@ look = {{ eye = [1, 1, 1], target = [0, 0, 0], resolution = [16, 16] }}
     }
 
     fn mean(geometry: &Geometry, point: Vec3, normal: Vec3, n: u32) -> (f64, f64) {
-        let values: Vec<f64> = (0..n).map(|i| path(geometry, point, normal, &Sampler::new(9, i, 0), 0)).collect();
+        let values: Vec<f64> = (0..n)
+            .map(|i| f64::from(luminance(path(geometry, point, normal, &Sampler::new(9, i, 0), 0).to_array())))
+            .collect();
         let mean = values.iter().sum::<f64>() / f64::from(n);
         let var = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / f64::from(n - 1);
         (mean, (var / f64::from(n)).sqrt())
@@ -251,17 +253,68 @@ look = {{ eye = [1, 1, 1], target = [0, 0, 0], resolution = [16, 16] }}
         }
     }
 
-    /// A lamp in the ceiling of a closed room, aimed at and not: the same mean,
+    /// A lamp in the ceiling of a closed room: found by chance alone, aimed at,
+    /// and aimed at twice over, through a portal that marks it. The same mean,
     /// less noise.
     #[test]
-    fn a_portal_may_mark_a_lamp() {
+    fn lamps_are_aimed_at() {
         let room = "[[object]]\nname = 'room'\nshape = { block = { min = [-2, 0, -2], max = [2, 2.5, 2] } }\n\
              [[object]]\nname = 'lamp'\nemission = [9, 9, 9]\nshape = { plane = { center = [0, 2.4, 0], u = [0.5, 0, 0], v = [0, 0, 0.5] } }";
         let at = Vec3::new(0.5, 0.0, 0.2);
-        let (plain, plain_se) = mean(&lit(room, "{}"), at, Vec3::Y, 120_000);
+        let mut by_chance = lit(room, "{}");
+        by_chance.lights = Lights::default();
+        let (plain, plain_se) = mean(&by_chance, at, Vec3::Y, 60_000);
         let portal = "{ portals = [{ corner = [-0.25, 2.4, -0.25], u = [0.5, 0, 0], v = [0, 0, 0.5] }] }";
-        let (m, se) = mean(&lit(room, portal), at, Vec3::Y, 60_000);
-        assert!((m - plain).abs() < 5.0 * se.hypot(plain_se), "{m} +- {se}, {plain} +- {plain_se}");
-        assert!(se < 0.6 * plain_se, "aiming at the lamp must pay: {se} against {plain_se}");
+        for environment in ["{}", portal] {
+            let (m, se) = mean(&lit(room, environment), at, Vec3::Y, 60_000);
+            assert!((m - plain).abs() < 5.0 * se.hypot(plain_se), "{m} +- {se}, {plain} +- {plain_se}");
+            assert!(se < 0.5 * plain_se, "aiming at the lamp must pay: {se} against {plain_se}");
+        }
+    }
+
+    /// A point light over a floor: I cos / (pi d^2), of each colour, and none in
+    /// the shadow of a block.
+    #[test]
+    fn a_point_light_gives_its_inverse_square() {
+        let mut g = lit(
+            "[[object]]\nname = 'floor'\nalbedo = 0\nshape = { plane = { center = [0, 0, 0], u = [0, 0, 40], v = [40, 0, 0] } }\n\
+             [[object]]\nname = 'block'\nalbedo = 0\nshape = { block = { min = [1.9, 0.5, -0.2], max = [2.1, 0.6, 0.2] } }",
+            "{ radiance = 1e-9 }",
+        );
+        g.lights = Lights::of_punctual(vec![aogauge_scenes::Light {
+            name: "lamp".into(),
+            kind: aogauge_scenes::LightKind::Point,
+            position: Vec3::new(1.0, 2.0, 0.0),
+            direction: Vec3::NEG_Y,
+            color: [1.0, 0.5, 0.25],
+            intensity: 30.0,
+            range: None,
+        }]);
+        let sampler = Sampler::new(3, 1, 4);
+        let light = path(&g, Vec3::ZERO, Vec3::Y, &sampler, 0);
+        let expected = 30.0 * (2.0 / 5.0f32.sqrt()) / (5.0 * PI);
+        for (value, share) in light.to_array().into_iter().zip([1.0, 0.5, 0.25]) {
+            assert!((value - expected * share).abs() < 2e-4, "{light}");
+        }
+        // The ray from the light through the block's middle meets the floor here.
+        let shadow = path(&g, Vec3::new(1.0 + 1.0 * 2.0 / 1.45, 0.0, 0.0), Vec3::Y, &sampler, 0);
+        assert!(shadow.max_element() < 1e-6, "{shadow}");
+    }
+
+    /// Red walls around a white floor make it reddish: E/pi by channel in a closed
+    /// box whose lower half glows is known where all walls share one albedo.
+    #[test]
+    fn a_colored_furnace_is_right_in_each_channel() {
+        let walls = "[[object]]\nname = 'a'\ncolor = [0.8, 0.4, 0.1]\nemission = [0.1, 0.2, 0.3]\nshape = { block = { min = [-1, -1, -1], max = [1, 1, 1] } }";
+        let g = lit(walls, "{}");
+        let n = 20_000;
+        let paths: Vec<Vec3> =
+            (0..n).map(|i| path(&g, Vec3::new(0.2, -1.0, 0.3), Vec3::Y, &Sampler::new(9, i, 0), 0)).collect();
+        for (c, (albedo, emission)) in [(0.8, 0.1), (0.4, 0.2), (0.1, 0.3)].into_iter().enumerate() {
+            let values: Vec<f64> = paths.iter().map(|p| f64::from(p[c])).collect();
+            let e = crate::stats::Estimate::of_mean(&values);
+            let expected = emission / (1.0 - albedo);
+            assert!((e.value - expected).abs() < 5.0 * e.se + 1e-6, "channel {c}: {} +- {}, {expected}", e.value, e.se);
+        }
     }
 }

@@ -265,7 +265,7 @@ impl<'a> Set<'a> {
                 }
             };
             let method = self.measured(own, &converged[self.method(case)]);
-            let on_classic = Case { estimator: classic.clone(), ..case.clone() };
+            let on_classic = self.classic_beside(case, classic);
             let classic_method = of(&on_classic).map(|own| self.measured(own, &converged[self.method(&on_classic)]));
             let on_cpu = Case { renderer: "cpu".into(), ..case.clone() };
             let cpu = of(&on_cpu).filter(|_| case.renderer != "cpu").map(|i| i.replicates.as_slice());
@@ -285,6 +285,15 @@ impl<'a> Set<'a> {
             });
         }
         Ok(records)
+    }
+
+    /// The case of classic AO that a case is compared with: the one of as many
+    /// rays, else, for a method with its own number of rays, that of the most.
+    fn classic_beside(&self, case: &Case, classic: &str) -> Case {
+        let suite = &self.plan.suite.file.rays;
+        let same = suite.iter().any(|r| r.get() == case.rays);
+        let rays = if same { case.rays } else { suite.iter().map(|r| r.get()).max().unwrap_or(case.rays) };
+        Case { estimator: classic.to_owned(), rays, ..case.clone() }
     }
 
     /// Writes mean, variance and replicates of a case; returns the path and the
@@ -356,10 +365,13 @@ impl<'a> Set<'a> {
             layers = layers.with(&format!("converged-{}", method.name), converged.mean.clone());
         }
         layers.write(&folder.path().join(&image))?;
-        let most = self.plan.suite.file.rays.iter().map(|r| r.get()).max().unwrap_or(0);
+        let most = |method: usize| {
+            let own = methods[method].rays;
+            own.or_else(|| self.plan.suite.file.rays.iter().copied().max()).map_or(0, |r| r.get())
+        };
         let mut profiles: Vec<profile::Curve> = self
             .cases()
-            .filter(|c| c.renderer == "cpu" && c.rays == most)
+            .filter(|c| c.renderer == "cpu" && c.rays == most(self.method(c)))
             .filter_map(|c| {
                 let own = images.get(&c.id())?.as_ref().ok()?;
                 Some(profile::of_method(&c.estimator, &own.replicates, width as usize))

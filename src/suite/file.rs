@@ -1,9 +1,9 @@
 //! The suite file.
 
+use super::EstimatorFile;
 use crate::{
     gate::{Gate, Limit},
     metrics::{MetricName, regions::Region},
-    render::{Estimator, ReceiverPlane},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
@@ -11,7 +11,7 @@ use serde::{Deserialize, Deserializer, Serialize, de::Error};
 macro_rules! counted {
     ($(#[$doc:meta])* $name:ident, $lo:literal ..= $hi:literal) => {
         $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
         #[serde(transparent)]
         pub struct $name(#[schemars(range(min = $lo, max = $hi))] u32);
 
@@ -128,43 +128,6 @@ pub struct SoftwareAdapter {
     pub scenes: Vec<String>,
     /// Rays a pixel.
     pub rays: Vec<Rays>,
-}
-
-/// `[[estimator]]`.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct EstimatorFile {
-    /// Unique in the suite.
-    pub name: String,
-    /// The method.
-    pub kind: Kind,
-    /// For `extended`: whether the receiver closes secondary rays.
-    pub receiver_plane: Option<ReceiverPlane>,
-}
-
-/// The methods there are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Kind {
-    /// Share of rays with no hit within R.
-    Classic,
-    /// The paper's extension.
-    Extended,
-}
-
-impl EstimatorFile {
-    pub(super) fn build(&self) -> Result<Estimator, String> {
-        match (self.kind, self.receiver_plane) {
-            (Kind::Classic, None) => Ok(Estimator::Classic),
-            (Kind::Classic, Some(_)) => {
-                Err(format!("estimator '{}': receiver_plane belongs to kind 'extended' only", self.name))
-            }
-            (Kind::Extended, Some(receiver_plane)) => Ok(Estimator::Extended { receiver_plane }),
-            (Kind::Extended, None) => {
-                Err(format!("estimator '{}': kind 'extended' needs receiver_plane, 'counts' or 'clipped'", self.name))
-            }
-        }
-    }
 }
 
 /// A finite limit.

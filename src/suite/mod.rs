@@ -1,9 +1,11 @@
 //! What to run: a suite file, checked as a whole, becomes a plan of cases.
 
+mod estimator;
 mod file;
 mod plan;
 
-pub use file::{EstimatorFile, GateFile, JudgeSettings, Kind, Rays, Replicates, SoftwareAdapter, SuiteFile};
+pub use estimator::EstimatorFile;
+pub use file::{GateFile, JudgeSettings, Rays, Replicates, SoftwareAdapter, SuiteFile};
 pub use plan::{Case, Plan, Platform};
 
 use crate::{
@@ -23,6 +25,16 @@ pub struct Method {
     pub name: String,
     /// What it computes.
     pub estimator: Estimator,
+    /// Its own number of rays a pixel, in place of the suite's.
+    pub rays: Option<Rays>,
+}
+
+impl Method {
+    /// Whether the others are compared with this one: classic AO at the scene's
+    /// own scale and the suite's rays.
+    fn is_classic(&self) -> bool {
+        self.estimator == Estimator::CLASSIC && self.rays.is_none()
+    }
 }
 
 /// A suite with its scenes loaded and everything checked against everything.
@@ -133,7 +145,9 @@ impl Suite {
         if let Some(rays) = parsed.golden_rays.filter(|r| !parsed.rays.contains(r)) {
             return Err(invalid(format!("golden_rays is {}, which is not among rays", rays.get())));
         }
-        let most = parsed.rays.iter().map(|r| r.get()).max().unwrap_or(0);
+        let methods = methods(&parsed).map_err(invalid)?;
+        let all_rays = || parsed.rays.iter().copied().chain(methods.iter().filter_map(|m| m.rays));
+        let most = all_rays().map(Rays::get).max().unwrap_or(0);
         let converged = parsed.converged_rays.get();
         if converged < 4 * most || !converged.is_multiple_of(4) {
             return Err(invalid(format!(
@@ -143,7 +157,6 @@ impl Suite {
         if parsed.judge.max_replicates.get() < parsed.judge.replicates.get() {
             return Err(invalid("judge.max_replicates must not be below judge.replicates".into()));
         }
-        let methods = methods(&parsed).map_err(invalid)?;
         let mut gates = Vec::with_capacity(parsed.gates.len());
         let names = |of: &str, list: &[String], known: &mut dyn Iterator<Item = &str>, field: &str| {
             let known: Vec<&str> = known.collect();
@@ -155,7 +168,7 @@ impl Suite {
                 None => Ok(()),
             }
         };
-        let traced = |of: &str, rays: &[Rays]| match rays.iter().find(|r| !parsed.rays.contains(r)) {
+        let traced = |of: &str, rays: &[Rays]| match rays.iter().find(|r| !all_rays().any(|own| own == **r)) {
             Some(r) => Err(invalid(format!("{of}: rays names {}, which the suite does not trace", r.get()))),
             None => Ok(()),
         };
@@ -179,7 +192,7 @@ impl Suite {
 
     /// The index of the method that is classic AO.
     pub fn classic(&self) -> usize {
-        self.methods.iter().position(|m| m.estimator == Estimator::Classic).unwrap_or(0)
+        self.methods.iter().position(|m| m.is_classic()).unwrap_or(0)
     }
 }
 
@@ -190,10 +203,14 @@ fn methods(file: &SuiteFile) -> Result<Vec<Method>, String> {
             return Err(format!("estimator: '{}' is named twice", entry.name));
         }
         aogauge_scenes::check_name(&entry.name).map_err(|e| format!("estimator: {e}"))?;
-        methods.push(Method { name: entry.name.clone(), estimator: entry.build()? });
+        let (estimator, rays) = entry.build().map_err(|e| format!("estimator '{}': {e}", entry.name))?;
+        methods.push(Method { name: entry.name.clone(), estimator, rays });
     }
-    if !methods.iter().any(|m| m.estimator == Estimator::Classic) {
-        return Err("estimator: the suite needs one of kind 'classic', which the others are compared with".into());
+    if !methods.iter().any(|m| m.is_classic()) {
+        return Err(
+            "estimator: the suite needs one of kind 'classic' without options, which the others are compared with"
+                .into(),
+        );
     }
     Ok(methods)
 }

@@ -48,7 +48,8 @@ pub struct Plan<'a> {
 }
 
 impl<'a> Plan<'a> {
-    /// Lists the cases of a suite on a platform.
+    /// Lists the cases of a suite on a platform. Methods that the GPU does not
+    /// compute are rendered by the CPU alone.
     pub fn new(suite: &'a Suite, platform: Platform, seed: Option<u32>) -> Self {
         let marked = &suite.file.software_adapter;
         let mut cases = Vec::new();
@@ -58,7 +59,10 @@ impl<'a> Plan<'a> {
                     continue;
                 }
                 for method in &suite.methods {
-                    for rays in &suite.file.rays {
+                    if renderer == "gpu" && method.estimator.of_the_gpu().is_none() {
+                        continue;
+                    }
+                    for rays in method.rays.as_ref().map_or(suite.file.rays.as_slice(), std::slice::from_ref) {
                         let on_software = marked.as_ref().is_some_and(|m| {
                             (m.scenes.is_empty() || m.scenes.contains(&scene.name))
                                 && (m.rays.is_empty() || m.rays.contains(rays))

@@ -25,6 +25,8 @@ pub struct Hit {
     pub t: f32,
     /// The triangle, as it was numbered when the tracer was built.
     pub triangle: u32,
+    /// The same, as numbered in [`Tracer::triangles`].
+    pub leaf: u32,
     /// The point, interpolated from the corners.
     pub point: Vec3,
     /// Unit geometric normal, turned against the ray.
@@ -101,13 +103,34 @@ impl Tracer {
 
     /// Whether anything lies on the ray within `(0, tmax]`.
     pub fn occluded(&self, ray: &Ray) -> bool {
-        self.walk(
-            ray,
-            ray.tmax,
-            |triangle, tmax| {
-                if ray.meets(&self.triangles[triangle], tmax).is_some() { None } else { Some(tmax) }
-            },
-        )
+        self.occluded_by(ray, |_| true)
+    }
+
+    /// Whether a triangle that `accept` takes (by its corners) lies on the ray
+    /// within `(0, tmax]`.
+    #[inline]
+    pub fn occluded_by(&self, ray: &Ray, accept: impl Fn(&[Vec3; 3]) -> bool) -> bool {
+        self.walk(ray, ray.tmax, |triangle, tmax| {
+            let corners = &self.triangles[triangle];
+            if ray.meets(corners, tmax).is_some() && accept(corners) { None } else { Some(tmax) }
+        })
+    }
+
+    /// Distance along the ray, within `(0, tmax]`, to the nearest triangle that
+    /// `accept` takes.
+    pub fn distance(&self, ray: &Ray, accept: impl Fn(&[Vec3; 3]) -> bool) -> Option<f32> {
+        let mut nearest = None;
+        self.walk(ray, ray.tmax, |triangle, tmax| {
+            let corners = &self.triangles[triangle];
+            match ray.meets(corners, tmax) {
+                Some((t, _)) if accept(corners) => {
+                    nearest = Some(t);
+                    Some(t)
+                }
+                _ => Some(tmax),
+            }
+        });
+        nearest
     }
 
     /// The nearest triangle on the ray within `(0, tmax]`.
@@ -126,6 +149,7 @@ impl Tracer {
             Hit {
                 t,
                 triangle: self.source[triangle],
+                leaf: triangle as u32,
                 point: a * w.x + b * w.y + c * w.z,
                 normal: if normal.dot(ray.direction) > 0.0 { -normal } else { normal },
             }

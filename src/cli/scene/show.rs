@@ -160,7 +160,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
         let geometry = Geometry::new(&scene).map_err(fail)?;
         let view = scene.look.view();
         let rays = args.rays;
-        let job = Job { view: &view, estimator: Estimator::Classic, ao: scene.ao, rays, seed: 1, replicate: 0 };
+        let job = Job { view: &view, estimator: Estimator::CLASSIC, ao: scene.ao, rays, seed: 1, replicate: 0 };
         let frame = Cpu.load(&geometry).and_then(|mut loaded| loaded.render(&job)).map_err(fail)?;
         picture::openness(&frame.values, frame.resolution, 1, path)?;
         tell(&path.display().to_string());

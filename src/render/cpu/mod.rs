@@ -1,7 +1,14 @@
 //! The CPU reference renderer.
 
-use super::{Frame, Geometry, Job, Loaded, RenderError, Renderer, ao::Shading, gbuffer::GBuffer, sampler::Sampler};
-use aogauge_scenes::View;
+use super::{
+    Estimator, Frame, Geometry, Job, Loaded, Openness, RenderError, Renderer,
+    ao::{Decisions, Shading},
+    gbuffer::{GBuffer, Surface},
+    indirect, path,
+    sampler::Sampler,
+};
+use crate::trace::Tracer;
+use aogauge_scenes::{View, luminance};
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -30,28 +37,52 @@ impl Loaded for LoadedCpu<'_> {
             _ => &self.seen.insert((*job.view, GBuffer::new(tracer, job.view))).1,
         };
         let start = Instant::now();
-        let scale = 1.0 / (2.0 * job.rays as f32);
-        let (values, decisions): (Vec<f32>, Vec<_>) = gbuffer
-            .surfaces
-            .par_iter()
-            .enumerate()
-            .with_min_len(64)
-            .map(|(pixel, surface)| match surface {
-                None => (f32::NAN, Default::default()),
-                Some(s) => {
-                    let shading = Shading::new(tracer, s.point, s.normal, job.ao, job.estimator);
-                    let sampler = Sampler::new(job.seed, pixel as u32, job.replicate);
-                    let (halves, decisions) = shading.open_halves(job.rays, &sampler);
-                    (halves as f32 * scale, decisions)
-                }
-            })
-            .unzip();
+        let image = match &job.estimator {
+            Estimator::Openness(method) => openness(tracer, gbuffer, job, *method),
+            Estimator::LocalIndirect(method) => Image::colored(shade(gbuffer, [f32::NAN; 3], |pixel, surface| {
+                let sampler = Sampler::new(job.seed, pixel, job.replicate);
+                indirect::incident(self.geometry, surface, job.ao, method, job.rays, &sampler)
+            })),
+            Estimator::PathTraced => {
+                Image::colored(path::colors(self.geometry, gbuffer, job.rays, job.seed, job.replicate))
+            }
+        };
         Ok(Frame {
             resolution: gbuffer.resolution,
-            values,
-            decisions: Some(decisions),
+            values: image.values,
+            colors: image.colors,
+            decisions: image.decisions,
             seen: gbuffer.surfaces.iter().map(|s| s.map_or(u32::MAX, |s| s.triangle)).collect(),
             seconds: start.elapsed().as_secs_f64(),
         })
     }
+}
+
+/// What an estimator gives.
+struct Image {
+    values: Vec<f32>,
+    colors: Option<Vec<[f32; 3]>>,
+    decisions: Option<Vec<Decisions>>,
+}
+
+impl Image {
+    fn colored(colors: Vec<[f32; 3]>) -> Self {
+        Image { values: colors.iter().map(|&c| luminance(c)).collect(), colors: Some(colors), decisions: None }
+    }
+}
+
+fn openness(tracer: &Tracer, gbuffer: &GBuffer, job: &Job<'_>, method: Openness) -> Image {
+    let (values, decisions) = shade(gbuffer, (f32::NAN, Decisions::default()), |pixel, surface| {
+        let shading = Shading::new(tracer, surface.point, surface.normal, job.ao, method);
+        shading.openness(job.rays, &Sampler::new(job.seed, pixel, job.replicate))
+    })
+    .into_iter()
+    .unzip();
+    Image { values, colors: None, decisions: Some(decisions) }
+}
+
+/// A value for each pixel that sees a surface, `none` for the others.
+fn shade<T: Copy + Send + Sync>(gbuffer: &GBuffer, none: T, value: impl Fn(u32, &Surface) -> T + Sync) -> Vec<T> {
+    let surfaces = gbuffer.surfaces.par_iter().enumerate().with_min_len(64);
+    surfaces.map(|(pixel, surface)| surface.as_ref().map_or(none, |s| value(pixel as u32, s))).collect()
 }

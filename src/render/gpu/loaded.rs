@@ -1,7 +1,7 @@
 //! A scene on the GPU, and the dispatches that render it.
 
 use super::Gpu;
-use crate::render::{Estimator, Frame, Geometry, Job, Loaded, ReceiverPlane, RenderError, ao::Decisions};
+use crate::render::{Frame, Geometry, Job, Loaded, ReceiverPlane, RenderError, ao::Decisions};
 use aogauge_scenes::View;
 use bytemuck::{Pod, Zeroable};
 use std::time::{Duration, Instant};
@@ -174,10 +174,11 @@ impl<'a> LoadedGpu<'a> {
             direction_dy: direction_dy.to_array(),
             seed: job.seed,
             replicate: job.replicate,
-            estimator: match job.estimator {
-                Estimator::Classic => 0,
-                Estimator::Extended { receiver_plane: ReceiverPlane::Counts } => 1,
-                Estimator::Extended { receiver_plane: ReceiverPlane::Clipped } => 2,
+            // What is not known here was refused before.
+            estimator: match job.estimator.of_the_gpu() {
+                Some(Some(ReceiverPlane::Counts)) => 1,
+                Some(Some(ReceiverPlane::Clipped)) => 2,
+                _ => 0,
             },
             radius: job.ao.radius,
             secondary_radius: job.ao.secondary_radius,
@@ -275,6 +276,13 @@ impl Timer {
 
 impl Loaded for LoadedGpu<'_> {
     fn render(&mut self, job: &Job<'_>) -> Result<Frame, RenderError> {
+        if job.estimator.of_the_gpu().is_none() {
+            return Err(RenderError::Unsupported {
+                renderer: "gpu",
+                kind: job.estimator.kind(),
+                knows: "'classic' and the paper's 'extended'",
+            });
+        }
         let pixels = job.view.pixels() as u64;
         let images = match self.images.take() {
             Some(images) if images.pixels == pixels => images,
@@ -302,15 +310,21 @@ impl Loaded for LoadedGpu<'_> {
                 }
                 _ => wall,
             };
-            let scale = 1.0 / (2.0 * job.rays as f32);
             let source = self.geometry.tracer.source();
             Ok(Frame {
                 resolution: job.view.resolution,
                 values: halves
                     .iter()
                     .zip(&surfaces)
-                    .map(|(&h, s)| if s.triangle == u32::MAX { f32::NAN } else { h as f32 * scale })
+                    .map(|(&h, s)| {
+                        if s.triangle == u32::MAX {
+                            f32::NAN
+                        } else {
+                            (f64::from(h) / 2.0 / f64::from(job.rays)) as f32
+                        }
+                    })
                     .collect(),
+                colors: None,
                 decisions: Some(decisions),
                 seen: surfaces.iter().map(|s| source.get(s.triangle as usize).copied().unwrap_or(u32::MAX)).collect(),
                 seconds,
