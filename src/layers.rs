@@ -59,7 +59,10 @@ impl Layers {
         let channels = self
             .layers
             .iter()
-            .map(|(name, values)| AnyChannel::new(format!("{name}.Y").as_str(), FlatSamples::F32(values.clone())))
+            .map(|(name, values)| {
+                let channel = if name.contains('.') { name.clone() } else { format!("{name}.Y") };
+                AnyChannel::new(channel.as_str(), FlatSamples::F32(values.clone()))
+            })
             .collect();
         let mut attributes = LayerAttributes::default();
         if !self.attributes.is_empty() {
@@ -149,7 +152,12 @@ pub fn pixel_hash(values: &[f32]) -> String {
     for v in values {
         sha.update(v.to_bits().to_le_bytes());
     }
-    sha.finalize().iter().map(|b| format!("{b:02x}")).collect()
+    hex(&sha.finalize())
+}
+
+/// Bytes as hexadecimal digits.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
 /// Writes an 8-bit RGB PNG.

@@ -5,6 +5,7 @@ pub mod disk;
 pub mod flatland;
 pub mod gate;
 pub mod golden;
+pub mod judge_cache;
 pub mod kit;
 pub mod layers;
 pub mod metrics;

@@ -9,9 +9,9 @@ use crate::{
     disk::{DiskError, read_text, write_whole},
     gate::{Outcome, Verdict},
     metrics::{Metric, artifact::Brighter, profile::Curve, regions::Region},
-    render::Estimator,
     scenes::check_name,
     suite::Case,
+    suite::EstimatorFile,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -22,7 +22,7 @@ use std::{
 };
 
 /// Version of the record's format. Readers refuse others.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// The file that makes a folder a record.
 pub const FILE: &str = "record.json";
@@ -75,7 +75,7 @@ pub struct SuiteInfo {
     /// Estimator names, in order; the first of kind classic is `classic`.
     pub estimators: Vec<String>,
     /// What each of them computes.
-    pub methods: BTreeMap<String, Estimator>,
+    pub methods: BTreeMap<String, EstimatorFile>,
     /// The name of the classic estimator.
     pub classic: String,
 }
@@ -215,6 +215,8 @@ pub struct JudgeRecord {
     pub paths: u32,
     /// Replicates it took.
     pub replicates: u32,
+    /// Why it took no more.
+    pub stopped: Stopped,
     /// Half width of the widest 95 % interval of a region mean, relative; null
     /// where it is not known.
     pub precision: Option<f64>,
@@ -222,6 +224,16 @@ pub struct JudgeRecord {
     pub wanted: f64,
     /// Irradiance and Q, relative to the record.
     pub image: String,
+}
+
+/// Why the judge stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stopped {
+    /// Every region mean is as precise as was asked.
+    Precise,
+    /// The replicates it was allowed are spent.
+    Budget,
 }
 
 /// Q of a region.
@@ -271,6 +283,12 @@ pub struct Timing {
     pub cases: BTreeMap<String, f64>,
     /// Seconds the judge took, by scene.
     pub judges: BTreeMap<String, f64>,
+    /// Replicates of the judge that an earlier run had traced, by scene.
+    #[serde(default)]
+    pub cached_replicates: BTreeMap<String, usize>,
+    /// Why the judge's images could not be kept for the next run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cache_trouble: Option<String>,
 }
 
 impl Record {

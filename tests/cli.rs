@@ -12,8 +12,10 @@ use std::{
 };
 use tempfile::TempDir;
 
+/// Runs the program with a cache folder that it cannot make: no test leaves
+/// anything with the user, or finds what another left.
 fn aogauge(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_aogauge")).args(args).output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_aogauge")).env("XDG_CACHE_HOME", "/dev/null").args(args).output().unwrap()
 }
 
 /// Runs, checks the exit code and returns standard error.

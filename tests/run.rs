@@ -73,7 +73,7 @@ within = 0.01
     let observer = Steps::default();
     let machine = Machine::here("a test".into(), Some(false));
     let prepared = Prepared::new(&plan).unwrap();
-    let record = prepared.run(&Cpu, Some(&Failing), machine, &folder, &observer).unwrap();
+    let record = prepared.run(&Cpu, Some(&Failing), None, machine, &folder, &observer).unwrap();
     assert_eq!((observer.last.get() + 1, observer.total.get()), (steps(&plan), steps(&plan)));
     assert_eq!((record.summary.cases, record.summary.failed_cases, record.summary.pass), (4, 1, 1));
     let failed: Vec<_> = record.cases.iter().filter(|c| c.error.is_some()).collect();

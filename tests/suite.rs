@@ -18,7 +18,7 @@ fn aogauge(args: &[&str]) -> Output {
 }
 
 fn run(out: &Path, more: &[&str]) -> Record {
-    let output = aogauge(&[&["run", "--out", out.to_str().unwrap()], more].concat());
+    let output = aogauge(&[&["run", "--no-cache", "--out", out.to_str().unwrap()], more].concat());
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     Record::read(out).unwrap()
 }

@@ -3,6 +3,7 @@
 use crate::{Camera, Environment, Light, LightKind, LookView, Material, MeasureView, Mesh, Sky, luminance};
 use glam::Vec3;
 use sha2::{Digest, Sha256};
+use std::borrow::Cow;
 
 /// The scale on which ambient occlusion looks at a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +64,30 @@ impl Scene {
         let mut twin = self.clone();
         twin.objects.retain(|o| !o.occluder);
         twin
+    }
+
+    /// The same scene with the centre of its measure view in the origin, where
+    /// that at least halves the largest coordinate; else itself. Traced there, a
+    /// scene far from the origin reads as it would near it: rounding grows with
+    /// coordinates.
+    pub fn near_origin(&self) -> Cow<'_, Scene> {
+        let center = self.measure.center;
+        let largest = |from: Vec3| {
+            let points = self.objects.iter().flat_map(|o| &o.mesh.positions);
+            points.fold(0.0f32, |m, p| m.max((*p - from).abs().max_element()))
+        };
+        if largest(center) * 2.0 > largest(Vec3::ZERO) {
+            return Cow::Borrowed(self);
+        }
+        let mut near = self.clone();
+        near.objects.iter_mut().flat_map(|o| &mut o.mesh.positions).for_each(|p| *p -= center);
+        near.environment.portals.iter_mut().for_each(|p| p.corner -= center);
+        near.lights.iter_mut().for_each(|l| l.position -= center);
+        near.cameras.iter_mut().for_each(|c| c.position -= center);
+        near.measure.center = Vec3::ZERO;
+        near.look.eye -= center;
+        near.look.target -= center;
+        Cow::Owned(near)
     }
 
     /// All triangles in object order, each with the index of its object.

@@ -2,6 +2,7 @@
 
 mod doctor;
 mod golden;
+mod render;
 mod report;
 mod run;
 mod scene;
@@ -46,6 +47,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Verb {
     Run(run::Args),
+    Render(render::Args),
     Report(report::Args),
     #[command(subcommand)]
     Golden(golden::Verb),
@@ -110,6 +112,7 @@ impl Cli {
     pub fn execute(self) -> Result<Exit, Failure> {
         match self.verb {
             Verb::Run(args) => run::execute(&args),
+            Verb::Render(args) => render::execute(&args),
             Verb::Report(args) => report::execute(&args),
             Verb::Golden(verb) => golden::execute(&verb),
             Verb::Scene(verb) => scene::execute(&verb),

@@ -2,6 +2,7 @@
 
 use super::{Exit, Failure, Format, json, print, tell};
 use crate::{
+    judge_cache::JudgeCache,
     record::{Machine, Record, RecordFolder},
     render::{Renderer, cpu::Cpu, gpu::Gpu},
     report,
@@ -33,6 +34,10 @@ pub struct Args {
     /// CPU threads; all unless given. Results do not depend on it.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Trace the judge anew, without the images that earlier runs left in the
+    /// user's cache folder, and leave none.
+    #[arg(long)]
+    no_cache: bool,
     /// What is printed on standard output: nothing, or the record.
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -114,7 +119,11 @@ fn render(args: &Args, suite: &Suite, gpu: Option<&Gpu>, missing: &str) -> Resul
     let machine = Machine::here(gpu.map_or_else(|| missing.to_owned(), Gpu::describe), gpu.map(Gpu::is_software));
     let prepared = Prepared::new(&plan)?;
     let folder = RecordFolder::create(&args.out)?;
-    let record = prepared.run(&Cpu, gpu.map(|g| g as &dyn Renderer), machine, &folder, &bar())?;
+    let cache = if args.no_cache { None } else { JudgeCache::of_user() };
+    let record = prepared.run(&Cpu, gpu.map(|g| g as &dyn Renderer), cache.as_ref(), machine, &folder, &bar())?;
+    if let Some(trouble) = &record.timing.cache_trouble {
+        tell(&format!("aogauge: the judge's images are not kept for the next run: {trouble}"));
+    }
     Ok((record, folder))
 }
 

@@ -6,8 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How openness, or light, is computed at a point.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "quantity", rename_all = "kebab-case", deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Estimator {
     /// `classic`, `obscurance`, `extended`, `extended-obscurance`.
     Openness(Openness),
@@ -37,9 +36,15 @@ pub enum Kind {
     PathTraced,
 }
 
+impl std::fmt::Display for Kind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        use clap::ValueEnum;
+        self.to_possible_value().map_or(Ok(()), |v| f.write_str(v.get_name()))
+    }
+}
+
 /// Options of openness.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Openness {
     /// How much an occluder at a distance closes a ray.
     pub falloff: Falloff,
@@ -56,8 +61,7 @@ pub struct Openness {
 }
 
 /// Lengths in place of the scene's.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Scale {
     /// R, metres.
     pub radius: Option<f32>,
@@ -74,8 +78,7 @@ impl Scale {
 }
 
 /// Options of [`Estimator::LocalIndirect`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalIndirect {
     /// How much of an occluder's own light a distance lets through: 1 - mu(d).
     pub falloff: Falloff,
@@ -149,8 +152,7 @@ pub enum Faces {
 }
 
 /// The secondary rays of the paper's section 5, and ways to vary them.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extension {
     /// Whether the receiver closes secondary rays.
     pub receiver_plane: ReceiverPlane,

@@ -133,7 +133,7 @@ pub trait Loaded {
 pub enum RenderError {
     /// The scene is too large for its R in 32-bit floats.
     #[error(
-        "coordinates reach {magnitude} m, but with ao.radius = {radius} m they must stay below {largest} m: beyond, rounding errors would show in openness"
+        "the scene reaches {magnitude} m from the centre of its measure view or the origin, but with ao.radius = {radius} m it must stay within {largest} m: beyond, rounding errors would show in openness"
     )]
     Rounding {
         /// The largest coordinate, metres.
@@ -144,7 +144,7 @@ pub enum RenderError {
         largest: f32,
     },
     /// The renderer does not know the estimator.
-    #[error("the {renderer} renderer does not compute {kind:?} with these options yet; it knows {knows}")]
+    #[error("the {renderer} renderer does not compute '{kind}' with these options; it knows {knows}")]
     Unsupported {
         /// `gpu`.
         renderer: &'static str,

@@ -4,7 +4,7 @@ use super::table::{self, Row, outcome_text, plus_minus, subject, value_text};
 use crate::{
     gate::{CONFIDENCE, Outcome},
     metrics::{Metric, MetricName, artifact::Brighter, regions::Region},
-    record::{CaseRecord, Record, SceneRecord},
+    record::{CaseRecord, Record, SceneRecord, Stopped},
 };
 use minijinja::{Environment, syntax::SyntaxConfig, value::Serde};
 use serde::Serialize;
@@ -126,11 +126,15 @@ fn judge_text(scene: &SceneRecord) -> Option<String> {
         .collect();
     let precision = judge.precision.map_or_else(|| "unknown".to_owned(), |p| format!("{:.2} %", p * 100.0));
     Some(format!(
-        "K(Q) = {} against the {flank} flank: {reading}. Q: {}. {} replicates of {} paths a pixel; half width of the widest interval of a region mean: {precision}.",
+        "K(Q) = {} against the {flank} flank: {reading}. Q: {}. {} replicates of {} paths a pixel, until {}; half width of the widest interval of a region mean: {precision}.",
         show(Some(&judge.contrast)),
         q.join(", "),
         judge.replicates,
         judge.paths,
+        match judge.stopped {
+            Stopped::Precise => "precise enough",
+            Stopped::Budget => "the budget was spent",
+        },
     ))
 }
 

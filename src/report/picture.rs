@@ -24,13 +24,31 @@ pub fn openness(values: &[f32], resolution: [u32; 2], scale: u32, path: &Path) -
 
 /// Light: exposed so that the 98th percentile is white, then encoded as sRGB.
 pub fn irradiance(values: &[f32], resolution: [u32; 2], path: &Path) -> Result<(), DiskError> {
-    let mut sorted: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    let white = white(values.iter().copied());
+    write_png(path, &paint(values, resolution, 1, |v| srgb(v / white)))
+}
+
+/// Coloured light, exposed by the brightest channel of each pixel as in
+/// [`irradiance`].
+pub fn light(colors: &[[f32; 3]], [width, height]: [u32; 2], path: &Path) -> Result<(), DiskError> {
+    let white = white(colors.iter().map(|[r, g, b]| r.max(*g).max(*b)));
+    let picture = RgbImage::from_fn(width, height, |x, y| {
+        let color = colors[(y * width + x) as usize];
+        if color.iter().any(|c| c.is_nan()) { NOTHING } else { Rgb(color.map(|c| srgb(c / white))) }
+    });
+    write_png(path, &picture)
+}
+
+/// The 98th percentile of what is finite.
+fn white(values: impl Iterator<Item = f32>) -> f32 {
+    let mut sorted: Vec<f32> = values.filter(|v| v.is_finite()).collect();
     sorted.sort_by(f32::total_cmp);
-    let white = sorted.get(sorted.len() * 98 / 100).copied().unwrap_or(1.0).max(f32::MIN_POSITIVE);
-    let grey = |v: f32| {
-        let v = (v / white).clamp(0.0, 1.0);
-        let encoded = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-        (encoded * 255.0).round() as u8
-    };
-    write_png(path, &paint(values, resolution, 1, grey))
+    sorted.get(sorted.len() * 98 / 100).copied().unwrap_or(1.0).max(f32::MIN_POSITIVE)
+}
+
+/// An sRGB code of linear light, 1 for white.
+fn srgb(v: f32) -> u8 {
+    let v = v.clamp(0.0, 1.0);
+    let encoded = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+    (encoded * 255.0).round() as u8
 }

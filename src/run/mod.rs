@@ -6,10 +6,11 @@ mod set;
 use crate::{
     disk::DiskError,
     gate::Verdict,
+    judge_cache::JudgeCache,
     metrics::{Absent, Metric},
     record::{CaseRecord, IdleGate, Machine, Record, RecordFolder, SceneRecord, SuiteInfo, Summary, Timing, VERSION},
     render::{RenderError, Renderer},
-    suite::{Plan, Suite},
+    suite::{EstimatorFile, Plan, Suite},
 };
 use set::Set;
 use std::time::Instant;
@@ -101,7 +102,7 @@ impl<'a> Prepared<'a> {
     /// Runs the plan and commits its record.
     ///
     /// A case whose renderer fails ends with its error; the others go on. `gpu`
-    /// is used for the plan's cases on `gpu`.
+    /// is used for the plan's cases on `gpu`, `cache` for what earlier runs judged.
     ///
     /// # Errors
     /// Where a file cannot be written, or the CPU reference fails.
@@ -109,6 +110,7 @@ impl<'a> Prepared<'a> {
         &self,
         cpu: &dyn Renderer,
         gpu: Option<&dyn Renderer>,
+        cache: Option<&JudgeCache>,
         machine: Machine,
         folder: &RecordFolder,
         observer: &dyn Observer,
@@ -123,7 +125,7 @@ impl<'a> Prepared<'a> {
         let mut progress = Progress { observer, done: 0, total: steps(plan) };
         let (mut scenes, mut cases) = (Vec::new(), Vec::new());
         for set in &self.sets {
-            let (scene_record, case_records) = set.run(cpu, gpu, folder, &mut progress, &mut timing)?;
+            let (scene_record, case_records) = set.run(cpu, gpu, cache, folder, &mut progress, &mut timing)?;
             scenes.push(scene_record);
             cases.extend(case_records);
         }
@@ -155,7 +157,7 @@ fn suite_info(suite: &Suite) -> SuiteInfo {
         converged_rays: suite.file.converged_rays.get(),
         golden_rays: suite.file.golden_rays.map(crate::suite::Rays::get),
         estimators: suite.methods.iter().map(|m| m.name.clone()).collect(),
-        methods: suite.methods.iter().map(|m| (m.name.clone(), m.estimator)).collect(),
+        methods: suite.methods.iter().map(|m| (m.name.clone(), EstimatorFile::of(&m.estimator))).collect(),
         classic: suite.methods[suite.classic()].name.clone(),
     }
 }

@@ -5,6 +5,7 @@ use super::{
     case_metrics::{Others, metrics},
 };
 use crate::{
+    judge_cache::{JudgeCache, Key},
     layers::{Layers, pixel_hash},
     metrics::{
         Absent, Metric, MetricName,
@@ -13,13 +14,13 @@ use crate::{
         profile,
         regions::{Region, Regions},
     },
-    record::{CaseRecord, JudgeRecord, RecordFolder, RegionQ, SceneRecord, Timing},
+    record::{CaseRecord, JudgeRecord, RecordFolder, RegionQ, SceneRecord, Stopped, Timing},
     render::{Frame, Geometry, Job, Loaded, RenderError, Renderer, gbuffer::GBuffer, path},
     scenes::{Scene, View},
     stats::{Estimate, mean_variance},
     suite::{Case, Plan},
 };
-use std::{collections::BTreeMap, time::Instant};
+use std::{borrow::Cow, collections::BTreeMap, time::Instant};
 
 /// Paths a pixel that look for any light at all.
 const LIGHT_PATHS: u32 = 4;
@@ -36,7 +37,10 @@ const LOOK: u32 = 0x0001_0000;
 /// One scene made ready: geometry, twin, what the measure view sees.
 pub(super) struct Set<'a> {
     plan: &'a Plan<'a>,
-    scene: &'a Scene,
+    /// Near the origin.
+    scene: Cow<'a, Scene>,
+    /// Of the scene as it was given.
+    hash: String,
     geometry: Geometry,
     /// The scene without its occluder, traced from the same points; None where
     /// there is nothing to judge.
@@ -62,8 +66,9 @@ struct Images {
 }
 
 impl<'a> Set<'a> {
-    pub(super) fn new(plan: &'a Plan<'a>, scene: &'a Scene) -> Result<Self, RunError> {
-        let name = || scene.name.clone();
+    pub(super) fn new(plan: &'a Plan<'a>, given: &'a Scene) -> Result<Self, RunError> {
+        let scene = given.near_origin();
+        let name = || given.name.clone();
         let view = scene.measure.view();
         let cases = plan.cases.iter().filter(|c| c.scene == scene.name).count();
         let images = cases as f64 * f64::from(plan.suite.file.replicates.get());
@@ -71,20 +76,20 @@ impl<'a> Set<'a> {
         if gib > MAX_GIB {
             return Err(RunError::TooMuch { scene: name(), gib });
         }
-        let geometry = Geometry::new(scene).map_err(render_error(scene))?;
+        let geometry = Geometry::new(&scene).map_err(render_error(&scene))?;
         let gbuffer = GBuffer::new(&geometry.tracer, &view);
         let owner: Vec<usize> = scene.triangles().map(|(object, _)| object).collect();
         let mut seen = gbuffer.surfaces.iter().flatten().map(|s| &scene.objects[owner[s.triangle as usize]]);
         if let Some(object) = seen.find(|o| o.occluder) {
             return Err(RunError::SeesOccluder { scene: name(), object: object.name.clone() });
         }
-        let regions = Regions::new(scene, &geometry.tracer, &gbuffer);
+        let regions = Regions::new(&scene, &geometry.tracer, &gbuffer);
         if regions.pixels(Region::All).is_empty() {
             return Err(RunError::SeesNothing { scene: name() });
         }
         let mut twin = None;
         if scene.has_occluder() {
-            let mut bare = Geometry::new(&scene.twin()).map_err(render_error(scene))?;
+            let mut bare = Geometry::new(&scene.twin()).map_err(render_error(&scene))?;
             bare.tracer.set_offset(geometry.tracer.offset());
             let lit = path::irradiance(&bare, &gbuffer, LIGHT_PATHS, plan.seed, 0).iter().any(|e| *e > 0.0);
             if !lit {
@@ -92,22 +97,24 @@ impl<'a> Set<'a> {
             }
             twin = Some(bare);
         }
-        Ok(Set { plan, scene, geometry, twin, view, gbuffer, regions })
+        let hash = given.hash();
+        Ok(Set { plan, scene, hash, geometry, twin, view, gbuffer, regions })
     }
 
     pub(super) fn run(
         &self,
         cpu: &dyn Renderer,
         gpu: Option<&dyn Renderer>,
+        cache: Option<&JudgeCache>,
         folder: &RecordFolder,
         progress: &mut Progress<'_>,
         timing: &mut Timing,
     ) -> Result<(SceneRecord, Vec<CaseRecord>), RunError> {
         let methods = &self.plan.suite.methods;
-        let fail = render_error(self.scene);
+        let fail = render_error(&self.scene);
         let mut loaded_cpu = cpu.load(&self.geometry).map_err(&fail)?;
         progress.begin(&format!("{}: judge", self.scene.name));
-        let judged = self.judge(folder, timing)?;
+        let judged = self.judge(cache, folder, timing)?;
         progress.end();
         let mut converged = Vec::with_capacity(methods.len());
         for method in methods {
@@ -177,31 +184,47 @@ impl<'a> Set<'a> {
     }
 
     /// Traces the scene and its twin, adding replicates until every region mean
-    /// is as precise as the suite asks.
-    fn judge(&self, folder: &RecordFolder, timing: &mut Timing) -> Result<Result<Judged, Absent>, RunError> {
+    /// is as precise as the suite asks or the budget is spent. Replicates that an
+    /// earlier run traced are taken from the cache; the result is the same.
+    fn judge(
+        &self,
+        cache: Option<&JudgeCache>,
+        folder: &RecordFolder,
+        timing: &mut Timing,
+    ) -> Result<Result<Judged, Absent>, RunError> {
         let Some(twin) = &self.twin else {
             return Ok(Err(Absent("the scene has no occluder to judge".into())));
         };
         let start = Instant::now();
         let settings = &self.plan.suite.file.judge;
         let seed = self.plan.seed.wrapping_add(JUDGE);
+        let paths = settings.paths.get();
         let most = settings.max_replicates.get();
-        let mut pairs: Vec<Pair> = Vec::new();
+        let key = Key { scene: &self.hash, paths, seed };
+        let mut pairs = cache.map_or_else(Vec::new, |c| c.load(&key, self.view.resolution));
+        let cached = pairs.len();
+        let mut used = 0;
         let judge = loop {
-            let first = pairs.len() as u32;
-            let last = (first + settings.replicates.get()).min(most);
-            pairs.extend((first..last).map(|r| Pair {
-                with: path::irradiance(&self.geometry, &self.gbuffer, settings.paths.get(), seed, r),
-                without: path::irradiance(twin, &self.gbuffer, settings.paths.get(), seed, r),
+            let last = (used + settings.replicates.get()).min(most);
+            pairs.extend((pairs.len() as u32..last).map(|r| Pair {
+                with: path::irradiance(&self.geometry, &self.gbuffer, paths, seed, r),
+                without: path::irradiance(twin, &self.gbuffer, paths, seed, r),
             }));
-            let judge = match Judge::new(&pairs, &self.regions) {
+            used = last;
+            let judge = match Judge::new(&pairs[..used as usize], &self.regions) {
                 Ok(judge) => judge,
                 Err(absent) => return Ok(Err(absent)),
             };
-            if judge.widest() <= settings.precision || last >= most {
+            if judge.widest() <= settings.precision || used >= most {
                 break judge;
             }
         };
+        if let Some(cache) = cache.filter(|_| pairs.len() > cached) {
+            // A cache that cannot be written costs time, not the run.
+            timing.cache_trouble = cache.store(&key, self.view.resolution, &pairs).err().map(|e| e.to_string());
+        }
+        timing.cached_replicates.insert(self.scene.name.clone(), cached.min(used as usize));
+        pairs.truncate(used as usize);
         if !judge.has_light() {
             return Err(RunError::NoLight { scene: self.scene.name.clone() });
         }
@@ -220,6 +243,7 @@ impl<'a> Set<'a> {
             q: Judge::REGIONS.into_iter().filter_map(|r| Some((r, region_q(judge.q_of(r)?)))).collect(),
             paths: settings.paths.get(),
             replicates: pairs.len() as u32,
+            stopped: if sure { Stopped::Precise } else { Stopped::Budget },
             precision: precision.is_finite().then_some(precision),
             wanted: settings.precision,
             image: self.write_judge(folder, &judge)?,
@@ -330,7 +354,7 @@ impl<'a> Set<'a> {
         let mut layers = Layers::new(view.resolution);
         for method in &self.plan.suite.methods {
             let job = Job { view: &view, estimator: method.estimator, ao: self.scene.ao, rays, seed, replicate: 0 };
-            let frame = cpu.render(&job).map_err(render_error(self.scene))?;
+            let frame = cpu.render(&job).map_err(render_error(&self.scene))?;
             layers = layers.with(&format!("openness-{}", method.name), frame.values);
         }
         let gbuffer = GBuffer::new(&self.geometry.tracer, &view);
@@ -390,7 +414,7 @@ impl<'a> Set<'a> {
             name: self.scene.name.clone(),
             description: self.scene.description.clone(),
             control: self.scene.control,
-            hash: self.scene.hash(),
+            hash: self.hash.clone(),
             radius,
             secondary_radius: f64::from(self.scene.ao.secondary_radius),
             triangles: self.geometry.tracer.triangles().len(),

@@ -14,38 +14,53 @@ use std::{collections::BTreeMap, fmt::Display};
 #[serde(deny_unknown_fields)]
 pub struct EstimatorFile {
     /// Unique in the suite.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub name: String,
     /// The method.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub kind: Option<Kind>,
     /// Methods as engines and the paper set them: `unity-low`, `unity-medium`,
     /// `unity-high`, `unreal-default`, `microsoft-sample`, `paper-4`, `paper-32`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub preset: Option<String>,
     /// Primary rays a pixel, in place of the suite's.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub rays: Option<Rays>,
     /// How much an occluder at a distance closes a ray, for `obscurance`,
     /// `extended-obscurance` and `local-indirect`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub falloff: Option<Falloff>,
     /// Which side of a triangle closes a ray; both unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub faces: Option<Faces>,
     /// Openness is taken to this power: above 0, at most 16; 1 unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub intensity: Option<f32>,
     /// R in metres, in place of the scene's.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<f32>,
     /// R' in metres, in place of the scene's; a quarter of `radius` where that is
     /// given alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub secondary_radius: Option<f32>,
     /// For extended methods: whether the receiver closes secondary rays.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub receiver_plane: Option<ReceiverPlane>,
     /// For extended methods: secondary rays a primary ray, 1 to 8; 2 unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub secondary_rays: Option<u32>,
     /// For extended methods: whether secondary rays go both ways from their
     /// origin; they do unless told otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub secondary_sides: Option<Sides>,
     /// For extended methods: where on the primary ray secondary rays start; in
     /// the middle unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub secondary_origin: Option<SecondaryOrigin>,
 }
+
+/// The paper's number.
+const SECONDARY_RAYS: u32 = 2;
 
 /// The presets there are, by name.
 fn presets() -> Result<BTreeMap<String, EstimatorFile>, String> {
@@ -61,6 +76,31 @@ impl EstimatorFile {
         let merged = self.merged()?;
         let estimator = merged.estimator()?;
         Ok((estimator, merged.rays))
+    }
+
+    /// The options of a method, without those that are as they would be anyway:
+    /// what records and goldens know it by.
+    pub fn of(estimator: &Estimator) -> EstimatorFile {
+        let mut file = EstimatorFile { kind: Some(estimator.kind()), ..EstimatorFile::default() };
+        let (falloff, scale) = match estimator {
+            Estimator::Openness(o) => {
+                file.faces = Some(o.faces).filter(|f| *f != Faces::default());
+                file.intensity = Some(o.intensity).filter(|i| *i != 1.0);
+                if let Some(e) = o.extension {
+                    file.receiver_plane = Some(e.receiver_plane);
+                    file.secondary_rays = Some(e.secondary_rays).filter(|n| *n != SECONDARY_RAYS);
+                    file.secondary_sides = Some(e.sides).filter(|s| *s != Sides::default());
+                    file.secondary_origin = Some(e.origin).filter(|o| *o != SecondaryOrigin::default());
+                }
+                (o.falloff, o.scale)
+            }
+            Estimator::LocalIndirect(l) => (l.falloff, l.scale),
+            Estimator::PathTraced => return file,
+        };
+        file.falloff = Some(falloff).filter(|f| *f != Falloff::Step);
+        file.radius = scale.radius;
+        file.secondary_radius = scale.secondary_radius;
+        file
     }
 
     /// These options over those of the preset.
@@ -95,7 +135,6 @@ impl EstimatorFile {
 
     fn estimator(&self) -> Result<Estimator, String> {
         let kind = self.kind.ok_or("give kind or preset")?;
-        let label = label(kind);
         let openness = !matches!(kind, Kind::LocalIndirect | Kind::PathTraced);
         let extended = matches!(kind, Kind::Extended | Kind::ExtendedObscurance);
         let falls = matches!(kind, Kind::Obscurance | Kind::ExtendedObscurance | Kind::LocalIndirect);
@@ -111,7 +150,7 @@ impl EstimatorFile {
             ("secondary_origin", self.secondary_origin.is_some(), extended),
         ] {
             if given && !allowed {
-                return Err(format!("{field} means nothing for kind '{label}'"));
+                return Err(format!("{field} means nothing for kind '{kind}'"));
             }
         }
         let scale = Scale { radius: self.radius, secondary_radius: self.secondary_radius };
@@ -119,12 +158,12 @@ impl EstimatorFile {
         between("secondary_radius", self.secondary_radius, 0.0, 1e6, " m")?;
         let falloff = match (self.falloff, kind) {
             (Some(Falloff::Step), Kind::Obscurance | Kind::ExtendedObscurance) => {
-                return Err(format!("kind '{label}' with falloff 'step' is kind '{}'", label_of_step(kind)));
+                return Err(format!("kind '{kind}' with falloff 'step' is kind '{}'", of_step(kind)));
             }
             (Some(falloff), _) => legal(falloff)?,
             (None, Kind::Obscurance | Kind::ExtendedObscurance) => {
                 return Err(format!(
-                    "kind '{label}' needs falloff: {{ exponential = {{ extinction }} }}, {{ linear-tail = {{ tail }} }} \
+                    "kind '{kind}' needs falloff: {{ exponential = {{ extinction }} }}, {{ linear-tail = {{ tail }} }} \
                      or {{ gaussian = {{ lambda, floor, reflectance }} }}"
                 ));
             }
@@ -136,17 +175,17 @@ impl EstimatorFile {
             _ => Estimator::Openness(Openness {
                 falloff,
                 faces: self.faces.unwrap_or_default(),
-                extension: if extended { Some(self.extension(&label)?) } else { None },
+                extension: if extended { Some(self.extension(kind)?) } else { None },
                 intensity: between("intensity", self.intensity, 0.0, 16.0, "")?.unwrap_or(1.0),
                 scale,
             }),
         })
     }
 
-    fn extension(&self, label: &str) -> Result<Extension, String> {
+    fn extension(&self, kind: Kind) -> Result<Extension, String> {
         let receiver_plane =
-            self.receiver_plane.ok_or_else(|| format!("kind '{label}' needs receiver_plane, 'counts' or 'clipped'"))?;
-        let secondary_rays = self.secondary_rays.unwrap_or(2);
+            self.receiver_plane.ok_or_else(|| format!("kind '{kind}' needs receiver_plane, 'counts' or 'clipped'"))?;
+        let secondary_rays = self.secondary_rays.unwrap_or(SECONDARY_RAYS);
         if !(1..=Extension::MOST).contains(&secondary_rays) {
             return Err(format!("secondary_rays is {secondary_rays}: it must be from 1 to {}", Extension::MOST));
         }
@@ -159,14 +198,9 @@ impl EstimatorFile {
     }
 }
 
-/// What a kind is called in files.
-fn label(kind: Kind) -> String {
-    use clap::ValueEnum;
-    kind.to_possible_value().map_or_else(String::new, |v| v.get_name().to_owned())
-}
-
-fn label_of_step(kind: Kind) -> String {
-    label(if kind == Kind::Obscurance { Kind::Classic } else { Kind::Extended })
+/// What a kind with falloff is called where that is the step.
+fn of_step(kind: Kind) -> Kind {
+    if kind == Kind::Obscurance { Kind::Classic } else { Kind::Extended }
 }
 
 fn legal(falloff: Falloff) -> Result<Falloff, String> {
@@ -225,6 +259,29 @@ mod tests {
         let Estimator::Openness(o) = near else { panic!("{near:?}") };
         assert_eq!((o.scale.radius, rays.map(Rays::get)), (Some(1.0), Some(4)));
         assert_eq!(build("preset = 'paper-4'").unwrap().0, Estimator::extended(ReceiverPlane::Counts));
+    }
+
+    /// A method is the same after its options have been to disk and back, and the
+    /// paper's have no more words than they need.
+    #[test]
+    fn a_method_is_known_by_its_options() {
+        for text in [
+            "kind = 'classic'",
+            "kind = 'classic'\nfaces = 'front'\nintensity = 2.0\nradius = 3.0",
+            "kind = 'extended'\nreceiver_plane = 'clipped'\nsecondary_radius = 0.1\nsecondary_rays = 5",
+            "kind = 'extended-obscurance'\nfalloff = { linear-tail = { tail = 0.5 } }\nreceiver_plane = 'counts'\n\
+             secondary_sides = 'one'\nsecondary_origin = 'jittered'",
+            "kind = 'local-indirect'\nfalloff = { exponential = { extinction = 4.0 } }",
+            "kind = 'path-traced'",
+        ] {
+            let (estimator, _) = build(text).unwrap();
+            let file = EstimatorFile::of(&estimator);
+            assert_eq!(file, toml::from_str(text).unwrap());
+            let json = serde_json::to_string(&file).unwrap();
+            assert_eq!(serde_json::from_str::<EstimatorFile>(&json).unwrap(), file);
+        }
+        let json = serde_json::to_string(&EstimatorFile::of(&Estimator::extended(ReceiverPlane::Counts))).unwrap();
+        assert_eq!(json, r#"{"kind":"extended","receiver_plane":"counts"}"#);
     }
 
     #[test]

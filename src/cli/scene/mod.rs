@@ -29,7 +29,7 @@ pub fn execute(verb: &Verb) -> Result<Exit, Failure> {
 }
 
 /// A built-in scene by name, or a scene file by path.
-fn load(name: &str) -> Result<Scene, Failure> {
+pub(super) fn load(name: &str) -> Result<Scene, Failure> {
     if name.ends_with(".toml") {
         return Ok(Scene::from_file(Path::new(name))?);
     }

@@ -1,0 +1,260 @@
+//! `aogauge render`
+
+use super::{Exit, Failure, Format, json, print, scene::load, tell};
+use crate::{
+    layers::Layers,
+    render::{Estimator, Frame, Geometry, Job, Kind, RenderError, Renderer, cpu::Cpu, gpu::Gpu},
+    report::picture,
+    scenes::{Scene, View},
+    stats::mean_variance,
+    suite::EstimatorFile,
+};
+use clap::ValueEnum;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Render one image of a scene by one method.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  aogauge render curtain-arcade --out classic.png\n  \
+aogauge render curtain-arcade --estimator extended --set receiver_plane=clipped --rays 256 --out extended.exr\n  \
+aogauge render curtain-room --estimator obscurance --set 'falloff={ exponential = { extinction = 4.0 } }' --out o.exr\n  \
+aogauge render atrium --preset unity-high --view look --out unity.png\n  \
+aogauge render curtain-arcade --estimator path-traced --rays 1024 --replicates 8 --out judge.exr")]
+pub struct Args {
+    /// A built-in scene by name, or a scene file.
+    scene: String,
+    /// The image: .exr keeps 32-bit values in layers (mean, variance and each
+    /// replicate; color.R, .G and .B where the method knows colour), .png is for
+    /// looking at.
+    #[arg(long)]
+    out: PathBuf,
+    /// The method; classic unless given.
+    #[arg(long, value_enum, conflicts_with = "preset")]
+    estimator: Option<Kind>,
+    /// A method as an engine or the paper sets it.
+    #[arg(long)]
+    preset: Option<String>,
+    /// An option of the method as in a suite file, KEY=VALUE; may be repeated.
+    /// Keys: falloff, faces, intensity, radius, secondary_radius, receiver_plane,
+    /// secondary_rays, secondary_sides, secondary_origin.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    options: Vec<String>,
+    /// Rays, or paths, a pixel; the preset's, or 64.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=65536))]
+    rays: Option<u32>,
+    /// Independent images to take the mean of.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    replicates: u32,
+    /// Seed of all randomness.
+    #[arg(long, default_value_t = 1)]
+    seed: u32,
+    /// From where.
+    #[arg(long, value_enum, default_value_t)]
+    view: Which,
+    /// Without the occluder.
+    #[arg(long)]
+    twin: bool,
+    /// Who renders.
+    #[arg(long, value_enum, default_value_t)]
+    renderer: By,
+    /// What is printed on standard output.
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Which {
+    /// The view that metrics are taken from.
+    #[default]
+    Measure,
+    /// The view that pictures are taken from.
+    Look,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum By {
+    /// The CPU reference.
+    #[default]
+    Cpu,
+    /// The GPU.
+    Gpu,
+}
+
+/// What was rendered.
+#[derive(Serialize)]
+struct Rendered {
+    scene: String,
+    scene_hash: String,
+    estimator: EstimatorFile,
+    renderer: String,
+    rays: u32,
+    replicates: u32,
+    seed: u32,
+    resolution: [u32; 2],
+    /// Over the pixels that see a surface.
+    mean: f64,
+    seconds: f64,
+    image: String,
+}
+
+pub fn execute(args: &Args) -> Result<Exit, Failure> {
+    let is_png = match args.out.extension().and_then(|e| e.to_str()) {
+        Some("exr") => false,
+        Some("png") => true,
+        _ => {
+            return Err(Failure::usage(format!("--out is '{}': it must end in .exr or .png", args.out.display())));
+        }
+    };
+    let (estimator, own_rays) = method(args)?;
+    let rays = args.rays.or(own_rays).unwrap_or(64);
+    let scene = load(&args.scene)?;
+    let frames = frames(args, &scene.near_origin(), estimator, rays)?;
+    let image = Mean::of(&frames);
+    if is_png {
+        image.write_png(&args.out)?;
+    } else {
+        image.write_exr(&frames, &args.out)?;
+    }
+    let seen: Vec<f64> = image.mean.iter().filter(|v| !v.is_nan()).map(|&v| f64::from(v)).collect();
+    let rendered = Rendered {
+        scene_hash: scene.hash(),
+        scene: scene.name,
+        estimator: EstimatorFile::of(&estimator),
+        renderer: if args.renderer == By::Cpu { "cpu" } else { "gpu" }.into(),
+        rays,
+        replicates: args.replicates,
+        seed: args.seed,
+        resolution: image.resolution,
+        mean: mean_variance(&seen).0,
+        seconds: frames.iter().map(|f| f.seconds).sum(),
+        image: args.out.display().to_string(),
+    };
+    match args.format {
+        Format::Json => print(&json(&rendered)?)?,
+        Format::Text => tell(&format!(
+            "{}: {} x {} pixels, {} x {} rays, {:.2} s, mean {:.4}",
+            rendered.image,
+            rendered.resolution[0],
+            rendered.resolution[1],
+            rendered.replicates,
+            rays,
+            rendered.seconds,
+            rendered.mean
+        )),
+    }
+    Ok(Exit::Pass)
+}
+
+/// The method that the options describe, and the preset's number of rays.
+fn method(args: &Args) -> Result<(Estimator, Option<u32>), Failure> {
+    let mut table = toml::Table::new();
+    for option in &args.options {
+        let (key, value) =
+            option.split_once('=').ok_or_else(|| Failure::usage(format!("--set '{option}': write KEY=VALUE")))?;
+        if !OPTIONS.contains(&key) {
+            return Err(Failure::usage(format!(
+                "--set '{option}': there is no option '{key}'; there are: {}",
+                OPTIONS.join(", ")
+            )));
+        }
+        // A bare word is a string.
+        let value = toml::from_str::<toml::Table>(&format!("v = {value}"))
+            .ok()
+            .and_then(|mut t| t.remove("v"))
+            .unwrap_or_else(|| toml::Value::String(value.to_owned()));
+        if table.insert(key.to_owned(), value).is_some() {
+            return Err(Failure::usage(format!("--set: '{key}' is given twice")));
+        }
+    }
+    let options = || args.options.join(", ");
+    let mut file: EstimatorFile = table
+        .try_into()
+        .map_err(|e: toml::de::Error| Failure::usage(format!("--set {}: {}", options(), e.message())))?;
+    file.preset = args.preset.clone();
+    if file.preset.is_none() {
+        file.kind = Some(args.estimator.unwrap_or(Kind::Classic));
+    }
+    let (estimator, rays) = file.build().map_err(|e| Failure::usage(format!("the estimator: {e}")))?;
+    Ok((estimator, rays.map(crate::suite::Rays::get)))
+}
+
+/// What `--set` takes.
+const OPTIONS: [&str; 9] = [
+    "falloff",
+    "faces",
+    "intensity",
+    "radius",
+    "secondary_radius",
+    "receiver_plane",
+    "secondary_rays",
+    "secondary_sides",
+    "secondary_origin",
+];
+
+fn frames(args: &Args, scene: &Scene, estimator: Estimator, rays: u32) -> Result<Vec<Frame>, Failure> {
+    let view: View = match args.view {
+        Which::Measure => scene.measure.view(),
+        Which::Look => scene.look.view(),
+    };
+    let fail = |e: RenderError| Failure::usage(format!("scene '{}': {e}", scene.name));
+    let twin = args.twin.then(|| scene.twin());
+    let geometry = Geometry::new(twin.as_ref().unwrap_or(scene)).map_err(fail)?;
+    let gpu = match args.renderer {
+        By::Cpu => None,
+        By::Gpu => Some(Gpu::open().map_err(fail)?),
+    };
+    let renderer: &dyn Renderer = gpu.as_ref().map_or(&Cpu, |g| g);
+    let mut loaded = renderer.load(&geometry).map_err(fail)?;
+    let frame = |replicate| {
+        let job = Job { view: &view, estimator, ao: scene.ao, rays, seed: args.seed, replicate };
+        loaded.render(&job).map_err(fail)
+    };
+    (0..args.replicates).map(frame).collect()
+}
+
+/// The mean of the replicates, a value a pixel.
+struct Mean {
+    resolution: [u32; 2],
+    mean: Vec<f32>,
+    variance: Vec<f32>,
+    colors: Option<Vec<[f32; 3]>>,
+}
+
+impl Mean {
+    fn of(frames: &[Frame]) -> Self {
+        let resolution = frames.first().map_or([0; 2], |f| f.resolution);
+        let pixels = frames.first().map_or(0, |f| f.values.len());
+        let over = |value: &dyn Fn(&Frame) -> f32| {
+            let values: Vec<f64> = frames.iter().map(|f| f64::from(value(f))).collect();
+            mean_variance(&values)
+        };
+        let (mean, variance) = (0..pixels).map(|i| over(&|f| f.values[i])).map(|(m, v)| (m as f32, v as f32)).unzip();
+        let colored = frames.iter().all(|f| f.colors.is_some());
+        let channel = |i: usize, c: usize| over(&|f| f.colors.as_ref().map_or(f32::NAN, |l| l[i][c])).0 as f32;
+        let colors = colored.then(|| (0..pixels).map(|i| [0, 1, 2].map(|c| channel(i, c))).collect());
+        Mean { resolution, mean, variance, colors }
+    }
+
+    fn write_exr(&self, frames: &[Frame], path: &Path) -> Result<(), Failure> {
+        let mut layers = Layers::new(self.resolution).with("mean", self.mean.clone());
+        if let Some(colors) = &self.colors {
+            for (c, name) in ["color.R", "color.G", "color.B"].into_iter().enumerate() {
+                layers = layers.with(name, colors.iter().map(|v| v[c]).collect());
+            }
+        }
+        if frames.len() > 1 {
+            layers = layers.with("variance", self.variance.clone());
+            for (r, frame) in frames.iter().enumerate() {
+                layers = layers.with(&format!("replicate-{r:04}"), frame.values.clone());
+            }
+        }
+        Ok(layers.write(path)?)
+    }
+
+    fn write_png(&self, path: &Path) -> Result<(), Failure> {
+        Ok(match &self.colors {
+            Some(colors) => picture::light(colors, self.resolution, path)?,
+            None => picture::openness(&self.mean, self.resolution, 1, path)?,
+        })
+    }
+}
