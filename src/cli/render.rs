@@ -252,9 +252,10 @@ impl Mean {
     }
 
     fn write_png(&self, path: &Path) -> Result<(), Failure> {
-        Ok(match &self.colors {
+        match &self.colors {
             Some(colors) => picture::light(colors, self.resolution, path)?,
             None => picture::openness(&self.mean, self.resolution, 1, path)?,
-        })
+        }
+        Ok(())
     }
 }

@@ -1,6 +1,7 @@
 //! A plan becomes a record: render, measure, judge, write.
 
 mod case_metrics;
+mod judging;
 mod set;
 
 use crate::{

@@ -3,24 +3,25 @@
 use super::{
     MAX_GIB, Progress, RunError,
     case_metrics::{Others, metrics},
+    judging::Judged,
 };
 use crate::{
-    judge_cache::{JudgeCache, Key},
+    judge_cache::JudgeCache,
     layers::{Layers, pixel_hash},
     metrics::{
-        Absent, Metric, MetricName,
+        Absent,
         artifact::{Converged, Method as Measured},
-        judge::{Judge, Pair},
+        judge::Judge,
         profile,
         regions::{Region, Regions},
     },
-    record::{CaseRecord, JudgeRecord, RecordFolder, RegionQ, SceneRecord, Stopped, Timing},
+    record::{CaseRecord, RecordFolder, SceneRecord, Timing},
     render::{Frame, Geometry, Job, Loaded, RenderError, Renderer, gbuffer::GBuffer, path},
     scenes::{Scene, View},
-    stats::{Estimate, mean_variance},
-    suite::{Case, Plan},
+    stats::mean_variance,
+    suite::{Case, Plan, Rays},
 };
-use std::{borrow::Cow, collections::BTreeMap, time::Instant};
+use std::{borrow::Cow, collections::BTreeMap};
 
 /// Paths a pixel that look for any light at all.
 const LIGHT_PATHS: u32 = 4;
@@ -31,32 +32,22 @@ const CONVERGED_REPLICATES: u32 = 4;
 /// Added to the seed for images that must not share random numbers with the
 /// replicates they are compared with.
 const CONVERGED: u32 = 0x00c0_0000;
-const JUDGE: u32 = 0x0010_0000;
 const LOOK: u32 = 0x0001_0000;
 
 /// One scene made ready: geometry, twin, what the measure view sees.
 pub(super) struct Set<'a> {
-    plan: &'a Plan<'a>,
+    pub(super) plan: &'a Plan<'a>,
     /// Near the origin.
-    scene: Cow<'a, Scene>,
+    pub(super) scene: Cow<'a, Scene>,
     /// Of the scene as it was given.
-    hash: String,
-    geometry: Geometry,
+    pub(super) hash: String,
+    pub(super) geometry: Geometry,
     /// The scene without its occluder, traced from the same points; None where
     /// there is nothing to judge.
-    twin: Option<Geometry>,
-    view: View,
-    gbuffer: GBuffer,
-    regions: Regions,
-}
-
-/// What the judge found, with its curve.
-struct Judged {
-    judge: Judge,
-    /// Why metrics must not use it.
-    usable: Result<(), Absent>,
-    record: JudgeRecord,
-    curve: profile::Curve,
+    pub(super) twin: Option<Geometry>,
+    pub(super) view: View,
+    pub(super) gbuffer: GBuffer,
+    pub(super) regions: Regions,
 }
 
 /// The images of one case.
@@ -181,88 +172,6 @@ impl<'a> Set<'a> {
             images.seconds += seconds;
         }
         Ok(images)
-    }
-
-    /// Traces the scene and its twin, adding replicates until every region mean
-    /// is as precise as the suite asks or the budget is spent. Replicates that an
-    /// earlier run traced are taken from the cache; the result is the same.
-    fn judge(
-        &self,
-        cache: Option<&JudgeCache>,
-        folder: &RecordFolder,
-        timing: &mut Timing,
-    ) -> Result<Result<Judged, Absent>, RunError> {
-        let Some(twin) = &self.twin else {
-            return Ok(Err(Absent("the scene has no occluder to judge".into())));
-        };
-        let start = Instant::now();
-        let settings = &self.plan.suite.file.judge;
-        let seed = self.plan.seed.wrapping_add(JUDGE);
-        let paths = settings.paths.get();
-        let most = settings.max_replicates.get();
-        let key = Key { scene: &self.hash, paths, seed };
-        let mut pairs = cache.map_or_else(Vec::new, |c| c.load(&key, self.view.resolution));
-        let cached = pairs.len();
-        let mut used = 0;
-        let judge = loop {
-            let last = (used + settings.replicates.get()).min(most);
-            pairs.extend((pairs.len() as u32..last).map(|r| Pair {
-                with: path::irradiance(&self.geometry, &self.gbuffer, paths, seed, r),
-                without: path::irradiance(twin, &self.gbuffer, paths, seed, r),
-            }));
-            used = last;
-            let judge = match Judge::new(&pairs[..used as usize], &self.regions) {
-                Ok(judge) => judge,
-                Err(absent) => return Ok(Err(absent)),
-            };
-            if judge.widest() <= settings.precision || used >= most {
-                break judge;
-            }
-        };
-        if let Some(cache) = cache.filter(|_| pairs.len() > cached) {
-            // A cache that cannot be written costs time, not the run.
-            timing.cache_trouble = cache.store(&key, self.view.resolution, &pairs).err().map(|e| e.to_string());
-        }
-        timing.cached_replicates.insert(self.scene.name.clone(), cached.min(used as usize));
-        pairs.truncate(used as usize);
-        if !judge.has_light() {
-            return Err(RunError::NoLight { scene: self.scene.name.clone() });
-        }
-        let precision = judge.widest();
-        let sure = precision <= settings.precision;
-        let vague = || {
-            Absent(format!(
-                "the judge is less precise than asked: {:.2} % of a region mean after {most} replicates, {:.2} % wanted",
-                precision * 100.0,
-                settings.precision * 100.0
-            ))
-        };
-        let contrast = if sure { Ok(judge.contrast()) } else { Err(vague()) };
-        let record = JudgeRecord {
-            contrast: Metric::new(MetricName::JudgeContrast, None, contrast),
-            q: Judge::REGIONS.into_iter().filter_map(|r| Some((r, region_q(judge.q_of(r)?)))).collect(),
-            paths: settings.paths.get(),
-            replicates: pairs.len() as u32,
-            stopped: if sure { Stopped::Precise } else { Stopped::Budget },
-            precision: precision.is_finite().then_some(precision),
-            wanted: settings.precision,
-            image: self.write_judge(folder, &judge)?,
-        };
-        let curve = profile::of_judge(&pairs, self.view.resolution[0] as usize);
-        timing.judges.insert(self.scene.name.clone(), start.elapsed().as_secs_f64());
-        Ok(Ok(Judged { usable: if sure { Ok(()) } else { Err(vague()) }, judge, record, curve }))
-    }
-
-    fn write_judge(&self, folder: &RecordFolder, judge: &Judge) -> Result<String, RunError> {
-        let image = format!("images/{}/judge.exr", self.scene.name);
-        let [with, without] = judge.irradiance.clone();
-        Layers::new(self.view.resolution)
-            .with("q", judge.q.clone())
-            .with("q-relative-se", judge.q_relative_se.clone())
-            .with("irradiance-with", with)
-            .with("irradiance-without", without)
-            .write(&folder.path().join(&image))?;
-        Ok(image)
     }
 
     fn measured<'b>(&'b self, own: &'b Images, converged: &'b Converged) -> Measured<'b> {
@@ -391,7 +300,7 @@ impl<'a> Set<'a> {
         layers.write(&folder.path().join(&image))?;
         let most = |method: usize| {
             let own = methods[method].rays;
-            own.or_else(|| self.plan.suite.file.rays.iter().copied().max()).map_or(0, |r| r.get())
+            own.or_else(|| self.plan.suite.file.rays.iter().copied().max()).map_or(0, Rays::get)
         };
         let mut profiles: Vec<profile::Curve> = self
             .cases()
@@ -429,13 +338,6 @@ impl<'a> Set<'a> {
             look,
         })
     }
-}
-
-/// A ratio with its interval, where that is known.
-fn region_q(e: Estimate) -> RegionQ {
-    let [lo, hi] = e.interval(0.95);
-    let interval = [lo, hi].iter().all(|v| v.is_finite()).then_some([lo, hi]);
-    RegionQ { value: e.value.is_finite().then_some(e.value), interval }
 }
 
 fn render_error(scene: &Scene) -> impl Fn(RenderError) -> RunError + use<> {

@@ -192,7 +192,7 @@ impl Suite {
 
     /// The index of the method that is classic AO.
     pub fn classic(&self) -> usize {
-        self.methods.iter().position(|m| m.is_classic()).unwrap_or(0)
+        self.methods.iter().position(Method::is_classic).unwrap_or(0)
     }
 }
 
@@ -206,7 +206,7 @@ fn methods(file: &SuiteFile) -> Result<Vec<Method>, String> {
         let (estimator, rays) = entry.build().map_err(|e| format!("estimator '{}': {e}", entry.name))?;
         methods.push(Method { name: entry.name.clone(), estimator, rays });
     }
-    if !methods.iter().any(|m| m.is_classic()) {
+    if !methods.iter().any(Method::is_classic) {
         return Err(
             "estimator: the suite needs one of kind 'classic' without options, which the others are compared with"
                 .into(),

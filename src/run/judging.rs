@@ -1,0 +1,135 @@
+//! The judge of one scene: traced until it is precise, written, recorded.
+
+use super::{RunError, set::Set};
+use crate::{
+    judge_cache::{JudgeCache, Key},
+    layers::Layers,
+    metrics::{
+        Absent, Metric, MetricName,
+        judge::{Judge, Pair},
+        profile,
+    },
+    record::{JudgeRecord, RecordFolder, RegionQ, Stopped, Timing},
+    render::{Geometry, path},
+    stats::Estimate,
+};
+use std::time::Instant;
+
+/// Added to the seed, so that the judge shares no random numbers with what it
+/// judges.
+const JUDGE: u32 = 0x0010_0000;
+
+/// What the judge found, with its curve.
+pub(super) struct Judged {
+    pub judge: Judge,
+    /// Why metrics must not use it.
+    pub usable: Result<(), Absent>,
+    pub record: JudgeRecord,
+    pub curve: profile::Curve,
+}
+
+impl Set<'_> {
+    /// Judges the scene by its twin, and writes Q. Absent where there is nothing to
+    /// judge.
+    pub(super) fn judge(
+        &self,
+        cache: Option<&JudgeCache>,
+        folder: &RecordFolder,
+        timing: &mut Timing,
+    ) -> Result<Result<Judged, Absent>, RunError> {
+        let Some(twin) = &self.twin else {
+            return Ok(Err(Absent("the scene has no occluder to judge".into())));
+        };
+        let start = Instant::now();
+        let settings = &self.plan.suite.file.judge;
+        let (judge, pairs) = match self.trace_judge(twin, cache, timing) {
+            Ok(traced) => traced,
+            Err(absent) => return Ok(Err(absent)),
+        };
+        if !judge.has_light() {
+            return Err(RunError::NoLight { scene: self.scene.name.clone() });
+        }
+        let precision = judge.widest();
+        let sure = precision <= settings.precision;
+        let vague = || {
+            Absent(format!(
+                "the judge is less precise than asked: {:.2} % of a region mean after {} replicates, {:.2} % wanted",
+                precision * 100.0,
+                pairs.len(),
+                settings.precision * 100.0
+            ))
+        };
+        let contrast = if sure { Ok(judge.contrast()) } else { Err(vague()) };
+        let record = JudgeRecord {
+            contrast: Metric::new(MetricName::JudgeContrast, None, contrast),
+            q: Judge::REGIONS.into_iter().filter_map(|r| Some((r, region_q(judge.q_of(r)?)))).collect(),
+            paths: settings.paths.get(),
+            replicates: pairs.len() as u32,
+            stopped: if sure { Stopped::Precise } else { Stopped::Budget },
+            precision: precision.is_finite().then_some(precision),
+            wanted: settings.precision,
+            image: self.write_judge(folder, &judge)?,
+        };
+        let curve = profile::of_judge(&pairs, self.view.resolution[0] as usize);
+        timing.judges.insert(self.scene.name.clone(), start.elapsed().as_secs_f64());
+        Ok(Ok(Judged { usable: if sure { Ok(()) } else { Err(vague()) }, judge, record, curve }))
+    }
+
+    /// Traces the scene and its twin, adding replicates until every region mean
+    /// is as precise as the suite asks or the budget is spent. Replicates that an
+    /// earlier run traced are taken from the cache; the result is the same.
+    fn trace_judge(
+        &self,
+        twin: &Geometry,
+        cache: Option<&JudgeCache>,
+        timing: &mut Timing,
+    ) -> Result<(Judge, Vec<Pair>), Absent> {
+        let settings = &self.plan.suite.file.judge;
+        let seed = self.plan.seed.wrapping_add(JUDGE);
+        let paths = settings.paths.get();
+        let most = settings.max_replicates.get() as usize;
+        let key = Key { scene: &self.hash, paths, seed };
+        let mut pairs = cache.map_or_else(Vec::new, |c| c.load(&key, self.view.resolution));
+        let cached = pairs.len();
+        let mut used = 0;
+        let judge = loop {
+            used = (used + settings.replicates.get() as usize).min(most);
+            pairs.extend((pairs.len()..used).map(|r| Pair {
+                with: path::irradiance(&self.geometry, &self.gbuffer, paths, seed, r as u32),
+                without: path::irradiance(twin, &self.gbuffer, paths, seed, r as u32),
+            }));
+            let judge = Judge::new(&pairs[..used], &self.regions)?;
+            if judge.widest() <= settings.precision || used >= most {
+                break judge;
+            }
+        };
+        if let Some(cache) = cache.filter(|_| pairs.len() > cached)
+            && let Err(e) = cache.store(&key, self.view.resolution, &pairs)
+        {
+            // That costs time, not the run.
+            timing.cache_trouble = Some(e.to_string());
+        }
+        timing.cached_replicates.insert(self.scene.name.clone(), cached.min(used));
+        pairs.truncate(used);
+        Ok((judge, pairs))
+    }
+
+    fn write_judge(&self, folder: &RecordFolder, judge: &Judge) -> Result<String, RunError> {
+        let image = format!("images/{}/judge.exr", self.scene.name);
+        let [with, without] = judge.irradiance.clone();
+        Layers::new(self.view.resolution)
+            .with("q", judge.q.clone())
+            .with("q-relative-se", judge.q_relative_se.clone())
+            .with("irradiance-with", with)
+            .with("irradiance-without", without)
+            .write(&folder.path().join(&image))?;
+        Ok(image)
+    }
+}
+
+/// A ratio with its interval, where that is known.
+fn region_q(e: Estimate) -> RegionQ {
+    let [lo, hi] = e.interval(0.95);
+    let interval = [lo, hi].iter().all(|v| v.is_finite()).then_some([lo, hi]);
+    RegionQ { value: e.value.is_finite().then_some(e.value), interval }
+}
