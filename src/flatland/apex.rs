@@ -1,6 +1,6 @@
 //! Where a profile has its apex, and how high it is.
 
-use super::{Model, Slab, quadrature::integrate};
+use super::{Model, Slab, quadrature::panel};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -36,10 +36,7 @@ pub struct Apex {
 /// by less than `tolerance`.
 pub fn contrast(model: &Model, slab: &Slab, tolerance: f64) -> Option<f64> {
     let (edge, r) = (slab.width / 2.0, model.radius);
-    let share = tolerance / 3.0;
-    let sum = |from: f64, to: f64, whole: f64| {
-        integrate(|t| model.openness(slab, t, share), from, to, 1, share * whole) / whole
-    };
+    let sum = |from: f64, to: f64, whole: f64| panel(|t| model.openness(slab, t, tolerance), from, to) / whole;
     let foot = edge + MARGIN * r;
     let footprint = sum(0.0, edge, foot) + sum(edge, foot, foot);
     let flank = sum(edge + FLANK[0] * r, edge + FLANK[1] * r, (FLANK[1] - FLANK[0]) * r);

@@ -17,7 +17,7 @@ fn along(model: &Model, q: f64, sigma: f64, limited: bool, tolerance: f64) -> f6
         Measure::Uniform => 1,
         Measure::Cosine => 2,
     };
-    2.0 * integrate(|eta| (-sigma * q / eta.cos()).exp() * eta.cos().powi(power), 0.0, steepest, 1, tolerance)
+    2.0 * integrate(|eta| (-sigma * q / eta.cos()).exp() * eta.cos().powi(power), 0.0, steepest, tolerance)
 }
 
 /// Openness of the ground at `t`, off by less than `tolerance`.
@@ -33,7 +33,7 @@ pub fn openness(model: &Model, slab: &Slab, t: f64, sigma: f64, limited: bool, t
             (Space::Extruded, Measure::Uniform) => along(model, q(phi), sigma, limited, share) / (2.0 * PI),
             (Space::Extruded, Measure::Cosine) => along(model, q(phi), sigma, limited, share) * phi.sin() / PI,
         };
-        integrate(integrand, from, to, 2, share)
+        integrate(integrand, from, to, share)
     };
     // Rays that end at R see of a surface at distance k R only what lies within
     // acos(k) of its foot.

@@ -186,7 +186,7 @@ pub fn openness(
                 Measure::Cosine => |a| a.sin().powi(2).copysign(a) / 2.0,
             };
             let around = |psi| plane(psi).openness(weight) / FRAC_PI_2;
-            integrate(around, 0.0, FRAC_PI_2, 4, tolerance)
+            integrate(around, 0.0, FRAC_PI_2, tolerance)
         }
     };
     value.clamp(0.0, 1.0)
