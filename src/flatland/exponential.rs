@@ -42,8 +42,7 @@ pub fn openness(model: &Model, slab: &Slab, t: f64, sigma: f64, limited: bool, t
         if limited { k.min(1.0).acos() } else { FRAC_PI_2 }
     };
     let reach = within(slab.gap);
-    let [from, to] =
-        [right, left].map(|x| slab.gap.atan2(x)).map(|a| a.clamp(FRAC_PI_2 - reach, FRAC_PI_2 + reach));
+    let [from, to] = [right, left].map(|x| slab.gap.atan2(x)).map(|a| a.clamp(FRAC_PI_2 - reach, FRAC_PI_2 + reach));
     let mut closed = sum(&|phi| slab.gap / phi.sin(), from, to);
     if right < 0.0 {
         let steepest = within(-right);

@@ -134,8 +134,7 @@ impl Plane {
         let first = self.y[0] <= y && y <= self.y[1] && self.x[0] - self.aside <= x && x <= self.x[1] + self.aside;
         // The box hangs over the ground: to cut the ray there changes nothing.
         let ground = self.receiver_plane == ReceiverPlane::Counts && reach * sin.abs() > y;
-        let second =
-            ground || self.meets([x - reach * cos, y + reach * sin], [2.0 * reach * cos, -2.0 * reach * sin]);
+        let second = ground || self.meets([x - reach * cos, y + reach * sin], [2.0 * reach * cos, -2.0 * reach * sin]);
         1.0 - f64::from(u8::from(first) + u8::from(second)) / 2.0
     }
 

@@ -4,12 +4,16 @@ use super::{Estimator, Model, Slab, contrast};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// How far the means in K may be off.
-const TOLERANCE: f64 = 3e-4;
+/// How far openness may be off.
+const TOLERANCE: f64 = 1e-3;
+
+/// Boxes along each side of the map.
+const CELLS: u32 = 40;
 
 /// The least contrast of the first curve that is worth taking away.
-pub const LEAST: f64 = 0.01;
+const LEAST: f64 = 0.01;
 
 /// Highlight contrast K over w/R in (0, 1) and m/R in (0, 1).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -38,15 +42,19 @@ pub struct MapCurve {
 }
 
 impl Map {
-    /// The map on `cells` x `cells` boxes of one height, for each estimator in
-    /// place of the model's own. Results do not depend on the number of threads.
-    pub fn new(model: &Model, estimators: &[Estimator], height: f64, cells: u32) -> Self {
-        let middles: Vec<f64> = (0..cells).map(|i| (f64::from(i) + 0.5) / f64::from(cells)).collect();
+    /// The map of boxes of one height, for each estimator in place of the model's
+    /// own; `tell` hears how many of how many boxes are done. Results do not depend
+    /// on the number of threads.
+    pub fn new(model: &Model, estimators: &[Estimator], height: f64, tell: &(dyn Fn(usize, usize) + Sync)) -> Self {
+        let middles: Vec<f64> = (0..CELLS).map(|i| (f64::from(i) + 0.5) / f64::from(CELLS)).collect();
+        let (done, total) = (AtomicUsize::new(0), estimators.len() * middles.len().pow(2));
         let grid = |estimator: Estimator| -> Vec<Vec<Option<f64>>> {
             let model = Model { estimator, ..*model };
             let cell = |gap: f64, width: f64| {
                 let slab = Slab { width: width * model.radius, gap: gap * model.radius, height };
-                contrast(&model, &slab, TOLERANCE)
+                let contrast = contrast(&model, &slab, TOLERANCE);
+                tell(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+                contrast
             };
             middles.par_iter().map(|&gap| middles.par_iter().map(|&width| cell(gap, width)).collect()).collect()
         };

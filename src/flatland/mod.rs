@@ -12,6 +12,7 @@ mod map;
 mod profile;
 mod quadrature;
 mod step;
+mod study;
 #[cfg(test)]
 mod tests;
 
@@ -20,6 +21,7 @@ pub use apex::{Apex, contrast};
 pub use map::{Map, MapCurve};
 pub use profile::{Profile, ProfileCurve};
 pub use step::Openness;
+pub use study::{Setting, Study};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

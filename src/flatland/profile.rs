@@ -1,12 +1,12 @@
 //! Profiles of openness across a box: the paper's Fig. 3.
 
-use super::{Apex, Estimator, Model, Slab};
+use super::{Apex, Estimator, Model, Slab, study::mirrored};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How far the values of a profile may be off.
-pub const TOLERANCE: f64 = 1e-5;
+const TOLERANCE: f64 = 1e-5;
 
 /// Openness across one box.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -33,17 +33,18 @@ pub struct ProfileCurve {
 }
 
 impl Profile {
-    /// Openness at the places `t`, metres from the box's middle, for each
-    /// estimator in place of the model's own.
+    /// Openness at the places `t` >= 0, ascending, metres from the box's middle, and
+    /// at their mirror images, for each estimator in place of the model's own.
     pub fn new(model: &Model, estimators: &[Estimator], slab: &Slab, t: &[f64]) -> Self {
         let curves = estimators
             .par_iter()
             .map(|&estimator| {
                 let model = Model { estimator, ..*model };
+                let right: Vec<f64> = t.par_iter().map(|&t| model.openness(slab, t, TOLERANCE)).collect();
                 ProfileCurve {
                     label: estimator.label().to_owned(),
                     apex: Apex::new(&model, slab, TOLERANCE),
-                    openness: t.par_iter().map(|&t| model.openness(slab, t, TOLERANCE)).collect(),
+                    openness: mirrored(&right, 1.0),
                 }
             })
             .collect();

@@ -86,7 +86,10 @@ fn an_empty_plane_reads_what_the_closed_form_says() {
     let away = Slab { width: 1.0, gap: 60.0, height: 1.0 };
     for (r, ratio) in RATIOS {
         let k: f64 = 2.0 * ratio;
-        assert!((all["plane_baseline_g1"][r]["ext_c"].as_f64().unwrap() - (1.0 - k * k / 2.0 / (1.0 + k * k))).abs() < 1e-12);
+        assert!(
+            (all["plane_baseline_g1"][r]["ext_c"].as_f64().unwrap() - (1.0 - k * k / 2.0 / (1.0 + k * k))).abs()
+                < 1e-12
+        );
         for (name, space, measure) in SPACES {
             let value = |plane| model(space, measure, extended(ratio, plane)).openness(&away, 3.0, 1e-9);
             let expected = all["plane_baseline_g1"][r][name].as_f64().unwrap();
