@@ -169,7 +169,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
         let unplotted = |e| Failure::usage(format!("the plot cannot be drawn: {e}"));
         let mut files = vec![("profiles.svg", plots::profiles(&study).map_err(unplotted)?)];
         if let Some(map) = &study.map {
-            files.push(("map.svg", plots::map(map).map_err(unplotted)?));
+            files.push(("map.svg", plots::map(&study.setting, map).map_err(unplotted)?));
         }
         // Last, so that where it is, the plots are.
         files.push(("flatland.json", document.clone()));

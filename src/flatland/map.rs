@@ -15,7 +15,8 @@ const CELLS: u32 = 40;
 /// The least contrast of the first curve that is worth taking away.
 const LEAST: f64 = 0.01;
 
-/// Highlight contrast K over w/R in (0, 1) and m/R in (0, 1).
+/// Highlight contrast K over w/R in (0.01, 1), in equal ratios, and m/R in (0, 1),
+/// in equal steps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Map {
@@ -42,11 +43,15 @@ pub struct MapCurve {
 }
 
 impl Map {
+    /// The left end of the map, w/R: thin occluders are where the artifact lives.
+    pub const NARROWEST: f64 = 0.01;
+
     /// The map of boxes of one height, for each estimator in place of the model's
     /// own; `tell` hears how many of how many boxes are done. Results do not depend
     /// on the number of threads.
     pub fn new(model: &Model, estimators: &[Estimator], height: f64, tell: &(dyn Fn(usize, usize) + Sync)) -> Self {
         let middles: Vec<f64> = (0..CELLS).map(|i| (f64::from(i) + 0.5) / f64::from(CELLS)).collect();
+        let widths: Vec<f64> = middles.iter().map(|x| Self::NARROWEST.powf(1.0 - x)).collect();
         let (done, total) = (AtomicUsize::new(0), estimators.len() * middles.len().pow(2));
         let grid = |estimator: Estimator| -> Vec<Vec<Option<f64>>> {
             let model = Model { estimator, ..*model };
@@ -56,7 +61,7 @@ impl Map {
                 tell(done.fetch_add(1, Ordering::Relaxed) + 1, total);
                 contrast
             };
-            middles.par_iter().map(|&gap| middles.par_iter().map(|&width| cell(gap, width)).collect()).collect()
+            middles.par_iter().map(|&gap| widths.par_iter().map(|&width| cell(gap, width)).collect()).collect()
         };
         let mut curves: Vec<MapCurve> = vec![];
         for &estimator in estimators {
@@ -65,7 +70,7 @@ impl Map {
             let removed = first.iter().zip(&contrast).map(|(a, b)| removed(a, b)).collect();
             curves.push(MapCurve { label: estimator.label().to_owned(), contrast, removed });
         }
-        Map { width: middles.clone(), gap: middles, curves }
+        Map { width: widths, gap: middles, curves }
     }
 }
 

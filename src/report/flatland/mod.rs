@@ -7,10 +7,47 @@ pub use map::map;
 pub use profiles::profiles;
 
 use crate::flatland::{Estimator, Map, MapCurve, Measure, Setting, Space, Study};
-use plotters::style::RGBColor;
+use plotters::{
+    coord::Shift,
+    prelude::{DrawingArea, IntoDrawingArea, IntoFont, RGBColor, SVGBackend, WHITE},
+    style::{
+        FontDesc, TextStyle,
+        text_anchor::{HPos, Pos, VPos},
+    },
+};
 use std::fmt::Write as _;
 
 const GREY: RGBColor = RGBColor(90, 90, 90);
+
+/// The drawing library rounds places to whole units: a pixel has this many, so
+/// that curves are smooth.
+const UNIT: u32 = 8;
+const UNIT_I: i32 = UNIT as i32;
+
+type Drawing<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Drawn = Result<(), Box<dyn std::error::Error>>;
+
+/// Draws on a white sheet of so many pixels.
+fn sheet([width, height]: [u32; 2], draw: impl Fn(&Drawing<'_>) -> Drawn) -> Result<String, String> {
+    let mut svg = String::new();
+    {
+        let root = SVGBackend::with_string(&mut svg, (width * UNIT, height * UNIT)).into_drawing_area();
+        root.fill(&WHITE).map_err(|e| e.to_string())?;
+        draw(&root).map_err(|e| e.to_string())?;
+        root.present().map_err(|e| e.to_string())?;
+    }
+    let drawn = format!("<svg width=\"{}\" height=\"{}\"", width * UNIT, height * UNIT);
+    Ok(svg.replacen(&drawn, &format!("<svg width=\"{width}\" height=\"{height}\""), 1))
+}
+
+/// A font of so many pixels. The library writes sizes divided by 1.24.
+fn font(pixels: u32) -> FontDesc<'static> {
+    ("sans-serif", f64::from(pixels * UNIT) * 1.24).into_font()
+}
+
+fn text(pixels: u32, horizontal: HPos) -> TextStyle<'static> {
+    TextStyle::from(font(pixels)).pos(Pos::new(horizontal, VPos::Center))
+}
 
 /// A length in metres, in centimetres with the digits it has.
 fn centimetres(metres: f64) -> String {
@@ -80,23 +117,19 @@ pub fn table(study: &Study) -> String {
 
 /// What a map says, a line an estimator.
 fn summary(map: &Map) -> String {
-    let mut text = "\nOver all boxes with w and m up to R:\n".to_owned();
+    let mut text = "\nOver the map, w from 0.01 R to R, m up to R:\n".to_owned();
     for curve in &map.curves {
-        let cells: Vec<(f64, f64, f64)> = cells(map, &curve.contrast).collect();
-        let bright = cells.iter().filter(|c| c.2 > 0.0).count() as f64 / cells.len().max(1) as f64;
-        let [mut least, mut most] = [(0.0, 0.0, f64::INFINITY), (0.0, 0.0, f64::NEG_INFINITY)];
-        for &cell in &cells {
-            least = if cell.2 < least.2 { cell } else { least };
-            most = if cell.2 > most.2 { cell } else { most };
-        }
+        let bright: Vec<(f64, f64, f64)> = cells(map, &curve.contrast).filter(|c| c.2 > 0.0).collect();
+        let Some(most) = bright.iter().max_by(|a, b| a.2.total_cmp(&b.2)) else {
+            let _ = writeln!(text, "{:16} K is above 0 nowhere{}", curve.label, removed(map, curve));
+            continue;
+        };
+        let widest = bright.iter().fold(0.0, |a: f64, c| a.max(c.0));
+        let (low, high) = bright.iter().fold((1.0, 0.0), |(a, b): (f64, f64), c| (a.min(c.1), b.max(c.1)));
         let _ = writeln!(
             text,
-            "{:16} K > 0 for {:.0} % of them; K from {:+.3} (w = {:.2} R, m = {:.2} R) to {:+.3} (w = {:.2} R, m = {:.2} R){}",
+            "{:16} K > 0 for w up to {widest:.2} R and m from {low:.2} R to {high:.2} R; greatest {:+.3} at w = {:.3} R, m = {:.2} R{}",
             curve.label,
-            100.0 * bright,
-            least.2,
-            least.0,
-            least.1,
             most.2,
             most.0,
             most.1,
@@ -116,7 +149,7 @@ fn removed(map: &Map, curve: &MapCurve) -> String {
     }
     let least = shares.iter().fold(1.0, |a: f64, &b| a.min(b));
     let mean = shares.iter().sum::<f64>() / shares.len() as f64;
-    format!("; removed {:.0} % (least {:.0} %)", 100.0 * mean, 100.0 * least)
+    format!("; removed {:.0} % on average, {:.0} % at least", 100.0 * mean, 100.0 * least)
 }
 
 /// The cells of a map that hold a number: w/R, m/R, value.
