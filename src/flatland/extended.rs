@@ -162,6 +162,23 @@ pub fn openness(
     receiver_plane: ReceiverPlane,
     tolerance: f64,
 ) -> f64 {
+    // No end of a secondary ray is further from the point than this.
+    let beneath = slab.gap > (model.radius / 2.0).hypot(secondary);
+    if beneath && receiver_plane == ReceiverPlane::Clipped {
+        return slab.openness(t, model.radius).of(model.space, model.measure);
+    }
+    by_planes(model, slab, t, secondary, receiver_plane, tolerance)
+}
+
+/// The same, without a look at whether any secondary ray reaches the box.
+pub(super) fn by_planes(
+    model: &Model,
+    slab: &Slab,
+    t: f64,
+    secondary: f64,
+    receiver_plane: ReceiverPlane,
+    tolerance: f64,
+) -> f64 {
     let t = t.abs();
     let across = [-slab.width / 2.0 - t, slab.width / 2.0 - t];
     let plane = |psi: f64| {

@@ -1,6 +1,6 @@
 //! Against reference values, known answers and limits.
 
-use super::{Apex, Estimator, Measure, Model, ReceiverPlane, Slab, Space, contrast};
+use super::{Apex, Estimator, Measure, Model, ReceiverPlane, Slab, Space, contrast, extended::by_planes};
 use proptest::prelude::*;
 use serde_json::Value;
 
@@ -197,7 +197,9 @@ proptest! {
         let gap = 25.0 * (0.25 + ratio * ratio).sqrt() * above;
         let slab = Slab { width, gap, height: 100.0 };
         let classic = model(space, measure, Estimator::Classic).openness(&slab, t, 1e-7);
-        let value = model(space, measure, extended(ratio, ReceiverPlane::Clipped)).openness(&slab, t, 1e-7);
+        let estimated = model(space, measure, extended(ratio, ReceiverPlane::Clipped));
+        prop_assert_eq!(estimated.openness(&slab, t, 1e-7), classic);
+        let value = by_planes(&estimated, &slab, t, 25.0 * ratio, ReceiverPlane::Clipped, 1e-7);
         prop_assert!((value - classic).abs() < 1e-6, "{value}, {classic}");
     }
 }

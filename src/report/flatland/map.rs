@@ -9,7 +9,7 @@ use plotters::{
 
 /// A panel's width and height, what axis labels take, and the colour bar's share,
 /// pixels.
-const PANEL: [u32; 2] = [310, 320];
+const PANEL: [u32; 2] = [318, 320];
 const STRIP: u32 = 64;
 const LABELS: [u32; 2] = [66, 52];
 const BAR: u32 = 108;
@@ -63,6 +63,7 @@ pub fn map(setting: &Setting, map: &Map) -> Result<String, String> {
 fn panel(map: &Map, curve: &MapCurve, first: bool, area: &Drawing<'_>) -> Drawn {
     let mut chart = ChartBuilder::on(area)
         .margin(8 * UNIT)
+        .margin_right(16 * UNIT)
         .x_label_area_size(LABELS[1] * UNIT)
         .y_label_area_size(if first { LABELS[0] * UNIT } else { 0 })
         .build_cartesian_2d(Map::NARROWEST.log10()..0.0, 0.0..1.0)?;
