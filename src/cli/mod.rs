@@ -1,6 +1,7 @@
 //! The command line: one file a verb, and what they share: exit codes.
 
 mod doctor;
+mod flatland;
 mod golden;
 mod render;
 mod report;
@@ -53,6 +54,7 @@ enum Verb {
     Golden(golden::Verb),
     #[command(subcommand)]
     Scene(scene::Verb),
+    Flatland(flatland::Args),
     Doctor(doctor::Args),
     Schema(schema::Args),
 }
@@ -116,6 +118,7 @@ impl Cli {
             Verb::Report(args) => report::execute(&args),
             Verb::Golden(verb) => golden::execute(&verb),
             Verb::Scene(verb) => scene::execute(&verb),
+            Verb::Flatland(args) => flatland::execute(&args),
             Verb::Doctor(args) => doctor::execute(&args),
             Verb::Schema(args) => schema::execute(&args),
         }

@@ -55,7 +55,7 @@ enum Choice {
 }
 
 /// Shows a bar on a terminal, and nothing elsewhere.
-struct Bar(ProgressBar);
+pub(super) struct Bar(ProgressBar);
 
 impl Drop for Bar {
     fn drop(&mut self) {
@@ -71,7 +71,7 @@ impl Observer for Bar {
     }
 }
 
-fn bar() -> Bar {
+pub(super) fn bar() -> Bar {
     let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
     if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len}  {elapsed} (left {eta})  {wide_msg}") {
         bar.set_style(style);

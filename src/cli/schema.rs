@@ -1,7 +1,7 @@
 //! `aogauge schema`
 
 use super::{Exit, Failure, json, print};
-use crate::{record::Record, scenes::Scene, suite::SuiteFile};
+use crate::{flatland::Study, record::Record, scenes::Scene, suite::SuiteFile};
 use clap::ValueEnum;
 
 /// Print the JSON Schema of a format.
@@ -22,6 +22,8 @@ enum Of {
     Suite,
     /// Scene files.
     Scene,
+    /// flatland.json
+    Flatland,
 }
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
@@ -29,6 +31,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
         Of::Record => schemars::schema_for!(Record),
         Of::Suite => schemars::schema_for!(SuiteFile),
         Of::Scene => Scene::file_schema(),
+        Of::Flatland => schemars::schema_for!(Study),
     };
     print(&json(&schema)?)?;
     Ok(Exit::Pass)

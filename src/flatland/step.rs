@@ -1,26 +1,11 @@
-//! The paper's section 3: openness of the ground under a box, in closed form.
-//!
-//! A box of width w and height h hangs m over the ground (Fig. 2); a point of the
-//! ground lies t beside the box's middle. Directions within the radius R of the
-//! box are closed. In *flatland* the world is the cross-section; *extruded*, the
-//! box is infinitely long and directions are those of 3D.
+//! Classic openness, the step at R, in closed form.
 //!
 //! The point sees the underside and, when it lies beside the box, the near side;
 //! both are segments at a constant distance, so with k = distance/R the extruded
 //! integrals reduce to one angle and have elementary antiderivatives.
 
+use super::{Measure, Slab, Space};
 use std::f64::consts::PI;
-
-/// A box over the ground, metres (or any one unit).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Slab {
-    /// w: width.
-    pub width: f64,
-    /// m: gap between the ground and its underside.
-    pub gap: f64,
-    /// h: height.
-    pub height: f64,
-}
 
 /// Openness of one point, each in [0, 1].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,6 +19,18 @@ pub struct Openness {
     /// Extruded, weighted by the cosine: Eq. 5 with the step at R, which is what
     /// the `classic` estimator measures.
     pub extruded_cosine: f64,
+}
+
+impl Openness {
+    /// The one of a space and a measure.
+    pub fn of(&self, space: Space, measure: Measure) -> f64 {
+        match (space, measure) {
+            (Space::Flat, Measure::Uniform) => self.flat_uniform,
+            (Space::Flat, Measure::Cosine) => self.flat_cosine,
+            (Space::Extruded, Measure::Uniform) => self.extruded_uniform,
+            (Space::Extruded, Measure::Cosine) => self.extruded_cosine,
+        }
+    }
 }
 
 /// Antiderivative of sqrt(1 - k^2 - u^2) / (1 - u^2).
@@ -102,7 +99,7 @@ mod tests {
 
     #[test]
     fn matches_the_reference_to_1e_6() {
-        let all: serde_json::Value = serde_json::from_str(include_str!("../tests/reference/openness.json")).unwrap();
+        let all: serde_json::Value = serde_json::from_str(include_str!("../../tests/reference/openness.json")).unwrap();
         let (radius, height) = (all["R"].as_f64().unwrap(), all["h"].as_f64().unwrap());
         let rows = all["rows"].as_array().unwrap();
         assert!(rows.len() > 20);
