@@ -157,14 +157,13 @@ shape = {{ curtain = {{ thickness = {width}, gap = {gap}, height = 1.0, length =
     for receiver_plane in [ReceiverPlane::Clipped, ReceiverPlane::Counts] {
         let estimator = Estimator::Extended { secondary_radius: 0.25 * ratio, receiver_plane };
         let model = Model { radius: 0.25, space: Space::Extruded, measure: Measure::Cosine, estimator };
-        let by_rays = render::Estimator::Extended { receiver_plane };
+        let extension = Some(render::Extension::of_the_paper(receiver_plane));
+        let by_rays = render::Openness { extension, ..render::Openness::plain(render::Falloff::Step) };
         for (salt, t) in [0.0, 0.02, 0.05, 0.1, 0.18].into_iter().enumerate() {
             let point = Vec3::new(t, 0.0, 0.1);
             let shading = Shading::new(&geometry.tracer, point, Vec3::Y, scene.ao, by_rays);
             let values: Vec<f64> = (0..64)
-                .map(|replicate| {
-                    f64::from(shading.open_halves(512, &Sampler::new(3, salt as u32, replicate)).0) / 1024.0
-                })
+                .map(|replicate| f64::from(shading.openness(512, &Sampler::new(3, salt as u32, replicate)).0))
                 .collect();
             let rays = Estimate::of_mean(&values);
             let exact = model.openness(&slab, f64::from(t), 1e-6);

@@ -140,7 +140,7 @@ impl Falloff {
 }
 
 /// Which side of a triangle closes a ray.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Faces {
     /// Both.
@@ -184,7 +184,7 @@ impl Extension {
 
 /// What happens when a secondary ray meets the receiver's own plane; the paper
 /// leaves it open, and it matters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ReceiverPlane {
     /// The literal reading: all geometry closes a secondary ray, the receiver
@@ -196,7 +196,7 @@ pub enum ReceiverPlane {
 }
 
 /// Where a secondary ray goes from its origin on the primary ray.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sides {
     /// R' both ways: a segment of length 2 R', closed by any hit on it.
@@ -207,7 +207,7 @@ pub enum Sides {
 }
 
 /// Where on the primary ray the secondary rays start.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SecondaryOrigin {
     /// In the middle of its open part.
