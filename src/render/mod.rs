@@ -9,7 +9,7 @@ pub mod path;
 pub mod sampler;
 
 use crate::trace::Tracer;
-use aogauge_scenes::{AoScale, Environment, Scene, View, luminance};
+use aogauge_scenes::{AoScale, Environment, Object, Scene, View};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -99,10 +99,9 @@ impl Geometry {
     /// [`RenderError::Rounding`] where the scene is so large for its R that
     /// rounding would show.
     pub fn new(scene: &Scene) -> Result<Self, RenderError> {
-        let (albedo, triangles): (Vec<f32>, Vec<_>) =
-            scene.triangles().map(|(object, corners)| (scene.objects[object].material.albedo(), corners)).unzip();
-        let mut emission: Vec<f32> =
-            scene.triangles().map(|(object, _)| luminance(scene.objects[object].material.emissive)).collect();
+        let triangles: Vec<_> = scene.triangles().map(|(_, corners)| corners).collect();
+        let albedo = scene.objects.iter().flat_map(Object::albedos).collect();
+        let mut emission: Vec<f32> = scene.objects.iter().flat_map(Object::emissions).collect();
         if emission.iter().all(|&e| e <= 0.0) {
             emission.clear();
         }
