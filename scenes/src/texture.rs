@@ -93,7 +93,7 @@ const MOST_PARTS: f64 = 32.0;
 /// would always be met in the same place.
 pub(crate) fn points(uvs: [Vec2; 3], size: [u32; 2]) -> impl Iterator<Item = Vec2> {
     const STEP: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
-    let [a, b, c] = uvs.map(|uv| uv.as_dvec2());
+    let [a, b, c] = uvs.map(Vec2::as_dvec2);
     let texels = glam::DVec2::new(size[0].into(), size[1].into());
     let (ab, ac) = ((b - a) * texels, (c - a) * texels);
     // A sliver covers few texels but may pass through many.

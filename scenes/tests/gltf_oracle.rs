@@ -61,12 +61,12 @@ impl Oracle {
         assert_eq!(found.emissive_factor().map(|e| e * strength), wanted.emissive);
         let textures = [pbr.base_color_texture(), pbr.metallic_roughness_texture(), found.emissive_texture()];
         for (found, wanted) in textures.into_iter().zip(wanted.textures()) {
-            self.same_texture(found.map(|t| t.texture()), wanted);
+            self.same_texture(found.map(|t| t.texture()).as_ref(), wanted);
         }
     }
 
-    fn same_texture(&self, found: Option<gltf::Texture<'_>>, wanted: Option<&Arc<Texture>>) {
-        let (Some(found), Some(wanted)) = (&found, wanted) else {
+    fn same_texture(&self, found: Option<&gltf::Texture<'_>>, wanted: Option<&Arc<Texture>>) {
+        let (Some(found), Some(wanted)) = (found, wanted) else {
             return assert_eq!(found.is_some(), wanted.is_some());
         };
         let image = &self.images[found.source().index()];
@@ -148,6 +148,17 @@ fn the_crate_takes_wrong_numbers_for_right_ones_and_refuses_what_is_allowed() {
     let read = root(b.json.clone()).unwrap();
     assert_eq!(read.nodes[0].mesh.unwrap().value(), 0);
     assert!(format!("{:?}", read.accessors[0].component_type).contains("F32"));
+    assert!(b.import().is_err());
+    // Elements that are wider than their stride are found out by a panic.
+    let mut b = common::triangle();
+    b.json["bufferViews"][0]["byteStride"] = 4.into();
+    let narrow = gltf::Gltf::from_slice_without_validation(&b.glb()).unwrap();
+    let blob = narrow.blob.as_deref();
+    let positions = std::panic::AssertUnwindSafe(|| {
+        let primitive = narrow.meshes().next().unwrap().primitives().next().unwrap();
+        primitive.reader(|_| blob).read_positions().map(Iterator::collect::<Vec<_>>)
+    });
+    assert!(std::panic::catch_unwind(positions).is_err());
     assert!(b.import().is_err());
     // A scene may have no nodes.
     let mut b = common::triangle();

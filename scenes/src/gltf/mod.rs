@@ -26,8 +26,10 @@
 //   of unknown kind, which the format tells readers to pass over, and computes
 //   `length - 12` unchecked; `Glb::from_reader` allocates by the header's length.
 // - `scenes[].nodes` is required, though the format leaves it optional.
-// - Accessor iterators of `gltf` slice by the file's numbers and panic where
-//   these do not hold; validation does not look at buffers.
+// - Its accessor iterators compute `stride * (count - 1)` unchecked, hold the
+//   width of an element against component type and stride only by
+//   `debug_assert`, and panic where the stride is the smaller. Quantised
+//   positions (KHR_mesh_quantization) are read as if they were floats.
 mod accessor;
 mod bytes;
 mod container;
