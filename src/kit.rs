@@ -6,7 +6,7 @@ use crate::{
     layers::Layers,
     metrics::regions::{Region, Regions},
     render::{Geometry, RenderError, gbuffer::GBuffer},
-    scenes::{Scene, Sky, gltf, views_json},
+    scenes::{Scene, SceneError, Sky, gltf, views_json},
 };
 use std::{io::Write, path::Path};
 
@@ -16,6 +16,9 @@ pub enum KitError {
     /// A file could not be written.
     #[error(transparent)]
     Disk(#[from] DiskError),
+    /// The scene file cannot be made.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
     /// The scene cannot be traced.
     #[error("scene '{scene}': {source}")]
     Render {
@@ -26,7 +29,7 @@ pub enum KitError {
     },
 }
 
-/// Writes `NAME.glb`, `NAME.twin.glb` (where there is an occluder), `views.json`,
+/// Writes `NAME.glb`, `NAME.toml`, `NAME.twin.glb` (where there is an occluder), `views.json`,
 /// `regions.exr`, `gbuffer.exr` and `README.md` into a folder.
 ///
 /// # Errors
@@ -40,6 +43,8 @@ pub fn write(scene: &Scene, folder: &Path) -> Result<(), KitError> {
     if scene.has_occluder() {
         glb(&scene.twin(), format!("{}.twin.glb", scene.name))?;
     }
+    let file = scene.model_toml(&format!("{}.glb", scene.name))?;
+    write_whole(&folder.join(format!("{}.toml", scene.name)), |out| out.write_all(file.as_bytes()))?;
     let views = views_json(scene);
     write_whole(&folder.join("views.json"), |out| out.write_all(views.as_bytes()))?;
     let geometry = Geometry::new(scene).map_err(render)?;
@@ -78,7 +83,8 @@ fn page(scene: &Scene) -> String {
     format!(
         "# {name}\n\n{}\n\n\
          ## What is here\n\n\
-         - `{name}.glb`: the scene, metres, +Y up, right-handed (glTF 2.0). Nodes of occluders carry `extras.aogauge.occluder`.\n{twin}\
+         - `{name}.glb`: the scene, metres, +Y up, right-handed (glTF 2.0). Nodes of occluders carry `extras.aogauge.occluder`.\n\
+         - `{name}.toml`: the scene file for it, with the light and R; `aogauge scene show {name}.toml` reads both back as the same scene.\n{twin}\
          - `views.json`: both views, R and R' as numbers. The glb holds them too, as the cameras `measure` (orthographic) and `look` (perspective).\n\
          - `regions.exr`: masks of 0 and 1 in the measure view: all, footprint, left, right, far.\n\
          - `gbuffer.exr`: position and geometric normal behind each pixel centre of the measure view; NaN where there is none.\n\n\

@@ -511,7 +511,9 @@ fn a_scene_can_be_shown_and_taken_elsewhere() {
 
     let kit = dir.path().join("kit");
     expect(0, &["scene", "export", "pillar", "--out", text(&kit)]);
-    for file in ["pillar.glb", "pillar.twin.glb", "views.json", "regions.exr", "gbuffer.exr", "README.md"] {
+    for file in
+        ["pillar.glb", "pillar.toml", "pillar.twin.glb", "views.json", "regions.exr", "gbuffer.exr", "README.md"]
+    {
         assert!(kit.join(file).exists(), "{file}");
     }
     let masks = aogauge::layers::Layers::read(&kit.join("regions.exr")).unwrap();
@@ -519,7 +521,11 @@ fn a_scene_can_be_shown_and_taken_elsewhere() {
     let surfaces = aogauge::layers::Layers::read(&kit.join("gbuffer.exr")).unwrap();
     assert!(surfaces.layers["normal.z"].iter().all(|n| (n - 1.0).abs() < 1e-6));
 
-    // A scene of the exported model, with views found from its sheet.
+    // The kit reads back as the scene it was made from.
+    let back = aogauge::scenes::Scene::from_file(&kit.join("pillar.toml")).unwrap();
+    assert!(back == aogauge::scenes::library::scene("pillar").unwrap());
+
+    // A scene of the exported model, written by hand.
     let own = dir.path().join("own.toml");
     fs::write(
         &own,

@@ -84,7 +84,7 @@ pub(crate) struct EnvironmentFile {
     /// A sky whose radiance changes with elevation.
     gradient: Option<GradientFile>,
     /// Openings and lamps worth aiming at, for scenes that are mostly closed.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     portals: Vec<PortalFile>,
 }
 
@@ -111,6 +111,23 @@ struct PortalFile {
 }
 
 impl EnvironmentFile {
+    /// As a scene file says it.
+    pub(crate) fn of(environment: &Environment) -> Self {
+        let (radiance, gradient) = match environment.sky {
+            Sky::None => (None, None),
+            Sky::Uniform(radiance) => (Some(Positive(radiance)), None),
+            Sky::Gradient { zenith, horizon, ground } => {
+                let [zenith, horizon, ground] = [zenith, horizon, ground].map(NonNegative);
+                (None, Some(GradientFile { zenith, horizon, ground }))
+            }
+        };
+        let portal = |p: &Portal| {
+            let [corner, u, v] = [p.corner, p.u, p.v].map(|v| Triple(v.to_array()));
+            PortalFile { corner, u, v }
+        };
+        EnvironmentFile { radiance, gradient, portals: environment.portals.iter().map(portal).collect() }
+    }
+
     /// The environment of a scene that has lamps or has none; the message says
     /// how to give light, or names a portal without area.
     pub(crate) fn build(&self, lamps: bool) -> Result<Environment, String> {
@@ -123,7 +140,7 @@ impl EnvironmentFile {
         if sky.is_dark() && !lamps {
             return Err(
                 "the scene has no light: give environment.radiance, environment.gradient with a value above 0, \
-                 or emission to an object that is not an occluder"
+                 emission to an object that is not an occluder, or a model with lights"
                     .into(),
             );
         }

@@ -6,9 +6,9 @@ use crate::{
     derive,
     environment::EnvironmentFile,
     generators::Shape,
-    gltf::GltfTable,
+    gltf::{self, GltfTable},
     luminance,
-    view::{LookFile, MeasureFile},
+    view_table::{LookTable, MeasureTable},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -65,16 +65,16 @@ pub(crate) struct SceneFile {
     /// The light; may be left out where objects with `emission` give it.
     #[serde(default)]
     environment: EnvironmentFile,
-    /// Where metrics are taken; found from the occluder and what it stands over
-    /// unless given.
-    measure: Option<MeasureFile>,
-    /// Where pictures are taken; towards the middle of the measure view unless
-    /// given.
-    look: Option<LookFile>,
+    /// Where metrics are taken; unless given, that of the model where it was
+    /// exported from here, else found from the occluder and what it stands over.
+    measure: Option<MeasureTable>,
+    /// Where pictures are taken; unless given, that of the model where it was
+    /// exported from here, else towards the middle of the measure view.
+    look: Option<LookTable>,
     /// Geometry from a model.
     gltf: Option<GltfTable>,
     /// The geometry, or what is added to the model.
-    #[serde(rename = "object", default)]
+    #[serde(rename = "object", default, skip_serializing_if = "Vec::is_empty")]
     objects: Vec<ObjectFile>,
 }
 
@@ -144,7 +144,7 @@ impl SceneFile {
                 });
             }
         }
-        let model = self.gltf.map(|g| g.load(folder)).transpose()?.unwrap_or_default();
+        let mut model = self.gltf.map(|g| g.load(folder)).transpose()?.unwrap_or_default();
         if let Some(o) = objects.iter().find(|o| model.objects.iter().any(|m| m.name == o.name)) {
             return Err(format!("an object and a part of gltf.file are both called '{}'", o.name));
         }
@@ -153,16 +153,24 @@ impl SceneFile {
             return Err("the scene has no receiver: give at least one object that is not an occluder".into());
         }
         // A lamp that is an occluder would leave the twin in the dark.
-        let lamps = objects.iter().any(|o| !o.occluder && luminance(o.material.emissive) > 0.0);
+        let lamps = objects.iter().any(|o| !o.occluder && o.emissions().any(|e| luminance(e) > 0.0))
+            || model.lights.iter().any(|l| l.intensity * luminance(l.color) > 0.0);
         let radius = self.ao.radius.0;
-        let measure = match &self.measure {
-            Some(given) => given.build(radius)?,
-            None => derive::measure(&objects, radius)?,
+        let measure = match (&self.measure, model.measure) {
+            (Some(given), _) => given.build(&model.cameras, radius)?,
+            (None, Some(view)) => {
+                view.fine_enough(radius).map_err(|e| format!("gltf.file: {e}"))?;
+                view
+            }
+            (None, None) => derive::measure(&objects, radius)?,
         };
-        let look = match &self.look {
-            Some(given) => given.build()?,
-            None => derive::look(&measure, radius),
+        let look = match (&self.look, model.look) {
+            (Some(given), _) => given.build(&model.cameras)?,
+            (None, Some(view)) => view,
+            (None, None) => derive::look(&measure, radius),
         };
+        // The views are no cameras beside themselves.
+        model.cameras.retain(|c| !gltf::VIEW_CAMERAS.contains(&c.name.as_str()));
         Ok(Scene {
             name: name.to_owned(),
             description: self.description,
@@ -218,6 +226,35 @@ impl Scene {
         let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { file: file.clone(), source })?;
         let name = path.file_stem().map_or_else(|| file.clone(), |s| s.to_string_lossy().into_owned());
         Scene::from_toml(&name, &file, &text, Some(path.parent().unwrap_or(Path::new("."))))
+    }
+
+    /// The scene file that goes with a model written by
+    /// [`write_glb`](crate::gltf::write_glb): it says what glTF cannot, and
+    /// leaves the rest to `model`, a path relative to it. Read back under the
+    /// scene's name, it gives the scene again.
+    ///
+    /// # Errors
+    /// [`SceneError::Invalid`] where TOML cannot hold it.
+    ///
+    /// # Example
+    /// ```
+    /// let toml = aogauge_scenes::library::scene("plane")?.model_toml("plane.glb")?;
+    /// assert!(toml.contains("file = \"plane.glb\""));
+    /// # Ok::<(), aogauge_scenes::SceneError>(())
+    /// ```
+    pub fn model_toml(&self, model: &str) -> Result<String, SceneError> {
+        let file = SceneFile {
+            description: self.description.clone(),
+            control: self.control,
+            ao: AoFile { radius: Positive(self.ao.radius), secondary_radius: Some(Positive(self.ao.secondary_radius)) },
+            environment: EnvironmentFile::of(&self.environment),
+            measure: None,
+            look: None,
+            gltf: Some(GltfTable::of(model)),
+            objects: Vec::new(),
+        };
+        toml::to_string(&file)
+            .map_err(|e| SceneError::Invalid { file: format!("{}.toml", self.name), message: e.to_string() })
     }
 
     /// The JSON Schema of scene files.

@@ -135,13 +135,18 @@ impl Scene {
             if o.material.emissive != [0.0; 3] {
                 floats(&o.material.emissive);
             }
-            if let Some(texture) = &o.material.texture {
-                for texel in &texture.texels {
-                    floats(&texel.map(f32::from));
-                }
-                for uv in &o.mesh.uvs {
-                    floats(&uv.to_array());
-                }
+            let textures = o.material.textures();
+            if textures.iter().any(Option::is_some) {
+                floats(&o.material.base_color);
+                floats(&[o.material.metallic]);
+                o.mesh.uvs.iter().for_each(|uv| floats(&uv.to_array()));
+            }
+            for (slot, texture) in textures.iter().enumerate() {
+                let Some(texture) = texture else { continue };
+                floats(&[slot as f32]);
+                floats(&texture.size.map(|n| n as f32));
+                floats(&texture.wrap.map(|w| f32::from(w as u8)));
+                texture.texels.iter().for_each(|texel| floats(&texel.map(f32::from)));
             }
             for corners in o.mesh.corners() {
                 for v in corners {

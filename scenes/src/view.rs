@@ -80,6 +80,15 @@ impl MeasureView {
         }
     }
 
+    /// Checks that details of the size of R can be seen.
+    pub(crate) fn fine_enough(&self, radius: f32) -> Result<(), String> {
+        let (pixel, largest) = (self.pixel, radius / 50.0);
+        if pixel > largest * 1.0001 {
+            return Err(format!("measure.pixel is {pixel} m: it must be no larger than ao.radius / 50 = {largest} m"));
+        }
+        Ok(())
+    }
+
     /// Coordinate of column `x`'s pixel centres along the transect, metres from
     /// the centre of the image.
     pub fn transect_at(&self, x: u32) -> f32 {
@@ -124,7 +133,7 @@ impl LookView {
 /// Width and height in pixels, each 16 to 4096.
 #[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 #[serde(transparent)]
-struct Resolution([u32; 2]);
+pub(crate) struct Resolution(pub [u32; 2]);
 
 impl<'de> Deserialize<'de> for Resolution {
     fn deserialize<D: serde::Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
@@ -143,32 +152,36 @@ impl<'de> Deserialize<'de> for Resolution {
 #[serde(deny_unknown_fields)]
 pub(crate) struct MeasureFile {
     /// The point of the receiver at the centre of the image, metres.
-    center: Triple,
+    pub center: Triple,
     /// Normal of the receiver, towards the occluder.
-    normal: Triple,
+    pub normal: Triple,
     /// Direction across the occluder, along the receiver.
-    transect: Triple,
+    pub transect: Triple,
     /// Height of the near plane over the receiver, metres: under the occluder.
-    clearance: Positive,
+    pub clearance: Positive,
     /// Edge of a pixel, metres; R/50 unless given, and no larger.
-    pixel: Option<Positive>,
+    pub pixel: Option<Positive>,
     /// Width and height in pixels.
-    resolution: Resolution,
+    pub resolution: Resolution,
 }
 
 impl MeasureFile {
     pub(crate) fn build(&self, radius: f32) -> Result<MeasureView, String> {
+        let view = self.with_pixel(self.pixel.map_or(radius / 50.0, |p| p.0))?;
+        view.fine_enough(radius)?;
+        Ok(view)
+    }
+
+    /// Where no R is known, which the pixel could follow from.
+    pub(crate) fn exact(&self) -> Result<MeasureView, String> {
+        self.with_pixel(self.pixel.ok_or("pixel is missing")?.0)
+    }
+
+    fn with_pixel(&self, pixel: f32) -> Result<MeasureView, String> {
         let normal = unit(self.normal.vec(), "measure.normal")?;
         let transect = unit(self.transect.vec(), "measure.transect")?;
         if normal.dot(transect).abs() > 1e-4 {
             return Err("measure.transect must be perpendicular to measure.normal".into());
-        }
-        let pixel = self.pixel.map_or(radius / 50.0, |p| p.0);
-        if pixel > radius / 50.0 * 1.0001 {
-            return Err(format!(
-                "measure.pixel is {pixel} m: it must be no larger than ao.radius / 50 = {} m",
-                radius / 50.0
-            ));
         }
         Ok(MeasureView {
             center: self.center.vec(),
@@ -179,6 +192,18 @@ impl MeasureFile {
             resolution: self.resolution.0,
         })
     }
+
+    /// A view in numbers.
+    pub(crate) fn of(view: &MeasureView) -> Self {
+        MeasureFile {
+            center: Triple(view.center.to_array()),
+            normal: Triple(view.normal.to_array()),
+            transect: Triple(view.transect.to_array()),
+            clearance: Positive(view.clearance),
+            pixel: Some(Positive(view.pixel)),
+            resolution: Resolution(view.resolution),
+        }
+    }
 }
 
 /// `[look]` of a scene file.
@@ -186,16 +211,26 @@ impl MeasureFile {
 #[serde(deny_unknown_fields)]
 pub(crate) struct LookFile {
     /// Position of the camera, metres.
-    eye: Triple,
+    pub eye: Triple,
     /// The point at the centre of the image, metres.
-    target: Triple,
+    pub target: Triple,
     /// Vertical field of view, degrees; 45 unless given.
-    fov: Option<Positive>,
+    pub fov: Option<Positive>,
     /// Width and height in pixels.
-    resolution: Resolution,
+    pub resolution: Resolution,
 }
 
 impl LookFile {
+    /// A view in numbers.
+    pub(crate) fn of(view: &LookView) -> Self {
+        LookFile {
+            eye: Triple(view.eye.to_array()),
+            target: Triple(view.target.to_array()),
+            fov: Some(Positive(view.fov)),
+            resolution: Resolution(view.resolution),
+        }
+    }
+
     pub(crate) fn build(&self) -> Result<LookView, String> {
         let (eye, target) = (self.eye.vec(), self.target.vec());
         let forward = unit(target - eye, "look.target - look.eye")?;
@@ -211,6 +246,10 @@ impl LookFile {
 }
 
 fn unit(v: Vec3, field: &str) -> Result<Vec3, String> {
+    // A view that is written and read again stays the same to the bit.
+    if (v.length_squared() - 1.0).abs() < 1e-6 {
+        return Ok(v);
+    }
     v.try_normalize().ok_or_else(|| format!("{field} is the zero vector: it must have a direction"))
 }
 

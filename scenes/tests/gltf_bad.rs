@@ -224,6 +224,14 @@ fn bad(path: &str, value: serde_json::Value) -> Vec<u8> {
 fn cameras_and_lights() -> Vec<Bad> {
     vec![
         ("camera-flat.gltf", bad("/cameras/0/perspective/yfov", json!(0)), "camera 0: its yfov is 0"),
+        (
+            "camera-view.gltf",
+            changed(everything(), |b| {
+                b.json["cameras"][0]["extras"] = json!({ "aogauge": { "look": { "eye": [0, 0, 0], "target": [0, 0, 1],
+                    "resolution": [4294967295_u32, 4294967295_u32] } } });
+            }),
+            "camera 0 holds the look view in its extras, but a resolution of 4294967295 x 4294967295 is out of range",
+        ),
         ("camera-of-no-kind.gltf", bad("/cameras/0", json!({})), "either perspective or orthographic"),
         ("light-missing.gltf", bad("/nodes/2/extensions/KHR_lights_punctual/light", json!(9)), "names light 9"),
         ("light-kind.gltf", bad("/extensions/KHR_lights_punctual/lights/0/type", json!("area")), "its type is 'area'"),
@@ -263,6 +271,24 @@ fn materials() -> Vec<Bad> {
             "names texture 3",
         ),
         ("texture-sourceless.gltf", bad("/textures/0", json!({})), "texture 0 has no PNG or JPEG source"),
+        (
+            "sampler-missing.gltf",
+            bad("/textures/0", json!({ "source": 0, "sampler": 0 })),
+            "texture 0 names sampler 0, but there are none",
+        ),
+        (
+            "sampler-wrap.gltf",
+            changed(everything(), |b| {
+                b.json["samplers"] = json!([{ "wrapT": 5 }]);
+                b.json["textures"][0]["sampler"] = json!(0);
+            }),
+            "sampler 0: its wrapT is 5: 10497, 33071, 33648 are known",
+        ),
+        (
+            "emissive-texture-missing.gltf",
+            changed(everything(), |b| b.json["materials"][0]["emissiveTexture"] = json!({ "index": 7 })),
+            "its emissiveTexture names texture 7",
+        ),
         ("image-missing.gltf", bad("/images/0", json!({ "uri": "no.png" })), "image 0 names 'no.png'"),
         ("image-parent.gltf", bad("/images/0", json!({ "uri": "../no.png" })), "image 0 names '../no.png'"),
         ("image-nowhere.gltf", bad("/images/0", json!({})), "image 0 must have a uri or a bufferView"),

@@ -4,7 +4,7 @@
 
 mod common;
 
-use aogauge_scenes::{LightKind, Projection, Scene, gltf::import_bytes};
+use aogauge_scenes::{LightKind, Projection, Scene, Wrap, gltf::import_bytes};
 use common::{Builder, TRIANGLE, everything, floats, png, shorts, triangle};
 use glam::{Mat4, Quat, Vec3};
 use serde_json::{Value, json};
@@ -126,12 +126,47 @@ fn materials_are_read_and_a_mask_is_cut_out() {
         m.objects[0].mesh.corners().map(|[a, b, c]| (b - a).cross(c - a).length() / 2.0).sum()
     };
     let cut = area(&model);
+    assert_eq!(leaf.material.name.as_deref(), Some("leaf"));
     b.json["materials"][0]["alphaMode"] = "BLEND".into();
+    assert_eq!(area(&b.import().unwrap()), cut, "what is blended is there where it is half opaque");
+    b.json["materials"][0]["alphaMode"] = "OPAQUE".into();
     let whole = area(&b.import().unwrap());
     // Two of four texels are there; what lies under them is not a square any more.
     assert!(cut > 0.4 * whole && cut < 0.6 * whole, "{cut} of {whole}");
     b.json["materials"][0]["extensions"] = json!({ "KHR_materials_emissive_strength": { "emissiveStrength": 10 } });
     assert_eq!(b.import().unwrap().objects[0].material.emissive, [1.0, 2.0, 3.0]);
+}
+
+#[test]
+fn samplers_say_how_a_texture_goes_on() {
+    let mut b = everything();
+    b.json["materials"][0]["alphaMode"] = "OPAQUE".into();
+    b.json["samplers"] = json!([{ "wrapS": 33071, "wrapT": 33648, "magFilter": 9728 }, {}]);
+    for (sampler, wrap) in [(0, [Wrap::Clamp, Wrap::Mirror]), (1, [Wrap::Repeat; 2])] {
+        b.json["textures"][0]["sampler"] = sampler.into();
+        assert_eq!(b.import().unwrap().objects[0].material.texture.as_ref().unwrap().wrap, wrap);
+    }
+}
+
+#[test]
+fn textures_of_metal_and_emission_are_read() {
+    let mut b = everything();
+    b.json["materials"][0]["alphaMode"] = "OPAQUE".into();
+    b.json["materials"][0]["pbrMetallicRoughness"]["metallicRoughnessTexture"] = json!({ "index": 0 });
+    b.json["materials"][0]["emissiveTexture"] = json!({ "index": 0 });
+    let material = b.import().unwrap().objects[0].material.clone();
+    assert_eq!(material.metallic_roughness_texture, material.texture);
+    assert_eq!(material.emissive_texture, material.texture);
+    // Laid on by other coordinates than the base colour, they count by their mean.
+    let moved = json!({ "index": 0, "extensions": { "KHR_texture_transform": { "offset": [0.5, 0.0] } } });
+    b.json["materials"][0]["pbrMetallicRoughness"]["metallicRoughnessTexture"] = moved.clone();
+    b.json["materials"][0]["emissiveTexture"] = moved;
+    let material = b.import().unwrap().objects[0].material.clone();
+    assert_eq!((&material.metallic_roughness_texture, &material.emissive_texture), (&None, &None));
+    assert!((material.metallic - 20.0 / 4.0 / 255.0).abs() < 1e-6, "{}", material.metallic);
+    assert!((material.roughness - 210.0 / 4.0 / 255.0).abs() < 1e-6);
+    // Red is 200 of 255 and 10 of 255 in sRGB: 0.578 and 0.003 in linear light.
+    assert!((material.emissive[0] - 0.1 * (0.578 + 0.003) / 4.0).abs() < 1e-4, "{:?}", material.emissive);
 }
 
 #[test]
@@ -209,11 +244,27 @@ look = { eye = [1, 1, 1], target = [0, 0, 0], resolution = [96, 64] }
 "#;
 
 fn scene(table: &str) -> Result<Scene, String> {
+    scene_of(&everything(), &format!("{SCENE}{table}"))
+}
+
+fn scene_of(model: &Builder, text: &str) -> Result<Scene, String> {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("model.glb"), everything().glb()).unwrap();
+    std::fs::write(folder.path().join("model.glb"), model.glb()).unwrap();
     let file = folder.path().join("scene.toml");
-    std::fs::write(&file, format!("{SCENE}{table}")).unwrap();
+    std::fs::write(&file, text).unwrap();
     Scene::from_file(&file).map_err(|e| e.to_string())
+}
+
+#[test]
+fn a_light_of_the_model_is_light_enough() {
+    let text = format!("{}[gltf]\nfile = 'model.glb'\n", SCENE.replace("environment = { radiance = 1.0 }\n", ""));
+    let mut b = everything();
+    b.json["materials"][0]["emissiveFactor"] = json!([0, 0, 0]);
+    let lit = scene_of(&b, &text).unwrap();
+    assert_eq!((lit.lights.len(), lit.environment.sky), (1, aogauge_scenes::Sky::None));
+    b.json["extensions"]["KHR_lights_punctual"]["lights"][0]["intensity"] = json!(0);
+    let message = scene_of(&b, &text).unwrap_err();
+    assert!(message.contains("no light") && message.contains("a model with lights"), "{message}");
 }
 
 #[test]

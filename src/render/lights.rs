@@ -46,17 +46,16 @@ pub struct Arrival {
 }
 
 impl Lights {
-    /// Collects the lights of a scene.
-    pub fn new(scene: &Scene) -> Self {
+    /// Collects the lights of a scene, from its triangles and what each sends out.
+    pub fn new(scene: &Scene, triangles: &[[Vec3; 3]], emission: &[[f32; 3]]) -> Self {
         let mut emitters = Vec::new();
         let mut powers = Vec::new();
         let mut power = 0.0;
-        for (triangle, (object, corners)) in scene.triangles().enumerate() {
-            let luminance = luminance(scene.objects[object].material.emissive);
-            let weight = f64::from(luminance) * f64::from(area(&corners));
+        for (triangle, (corners, &emission)) in triangles.iter().zip(emission).enumerate() {
+            let weight = f64::from(luminance(emission)) * f64::from(area(corners));
             if weight > 0.0 {
                 power += weight;
-                emitters.push(Emitter { triangle: triangle as u32, corners });
+                emitters.push(Emitter { triangle: triangle as u32, corners: *corners });
                 powers.push(power);
             }
         }

@@ -16,7 +16,7 @@ pub use estimator::{
 };
 
 use crate::trace::Tracer;
-use aogauge_scenes::{AoScale, Environment, Scene, View};
+use aogauge_scenes::{AoScale, Environment, Object, Scene, View};
 use glam::Vec3;
 use lights::Lights;
 
@@ -83,13 +83,13 @@ impl Geometry {
     /// [`RenderError::Rounding`] where the scene is so large for its R that
     /// rounding would show.
     pub fn new(scene: &Scene) -> Result<Self, RenderError> {
-        let (albedo, triangles): (Vec<[f32; 3]>, Vec<_>) =
-            scene.triangles().map(|(object, corners)| (scene.objects[object].material.albedo(), corners)).unzip();
-        let lights = Lights::new(scene);
-        let emission = match lights.has_emitters() {
-            true => scene.triangles().map(|(object, _)| scene.objects[object].material.emissive).collect(),
-            false => Vec::new(),
-        };
+        let triangles: Vec<_> = scene.triangles().map(|(_, corners)| corners).collect();
+        let albedo = scene.objects.iter().flat_map(Object::albedos).collect();
+        let mut emission: Vec<[f32; 3]> = scene.objects.iter().flat_map(Object::emissions).collect();
+        let lights = Lights::new(scene, &triangles, &emission);
+        if !lights.has_emitters() {
+            emission.clear();
+        }
         let tracer = Tracer::new(&triangles);
         let (offset, radius) = (tracer.offset(), scene.ao.radius);
         if offset > MAX_OFFSET * radius {

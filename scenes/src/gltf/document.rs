@@ -28,6 +28,8 @@ pub(super) struct Document {
     #[serde(default)]
     pub textures: Vec<TextureDef>,
     #[serde(default)]
+    pub samplers: Vec<SamplerDef>,
+    #[serde(default)]
     pub images: Vec<ImageDef>,
     #[serde(default)]
     pub cameras: Vec<CameraDef>,
@@ -168,6 +170,7 @@ pub(super) struct MaterialDef {
     pub pbr_metallic_roughness: Pbr,
     #[serde(default)]
     pub emissive_factor: [f32; 3],
+    pub emissive_texture: Option<TextureRef>,
     #[serde(default)]
     pub alpha_mode: AlphaMode,
     pub alpha_cutoff: Option<f32>,
@@ -191,11 +194,18 @@ pub(super) struct Pbr {
     pub base_color_texture: Option<TextureRef>,
     pub metallic_factor: f32,
     pub roughness_factor: f32,
+    pub metallic_roughness_texture: Option<TextureRef>,
 }
 
 impl Default for Pbr {
     fn default() -> Self {
-        Pbr { base_color_factor: [1.0; 4], base_color_texture: None, metallic_factor: 1.0, roughness_factor: 1.0 }
+        Pbr {
+            base_color_factor: [1.0; 4],
+            base_color_texture: None,
+            metallic_factor: 1.0,
+            roughness_factor: 1.0,
+            metallic_roughness_texture: None,
+        }
     }
 }
 
@@ -245,6 +255,20 @@ pub(super) struct EmissiveStrength {
 #[derive(Deserialize)]
 pub(super) struct TextureDef {
     pub source: Option<usize>,
+    pub sampler: Option<usize>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct SamplerDef {
+    pub wrap_s: u32,
+    pub wrap_t: u32,
+}
+
+impl Default for SamplerDef {
+    fn default() -> Self {
+        SamplerDef { wrap_s: super::texture::REPEAT, wrap_t: super::texture::REPEAT }
+    }
 }
 
 #[derive(Deserialize)]
@@ -259,6 +283,7 @@ pub(super) struct CameraDef {
     pub name: Option<String>,
     pub perspective: Option<Perspective>,
     pub orthographic: Option<Orthographic>,
+    pub extras: Option<Value>,
 }
 
 #[derive(Deserialize)]

@@ -1,7 +1,7 @@
 //! A scene as GLB: one node an object, cameras for the two views, lights.
 
 use super::{GltfError, container, export_views, texture};
-use crate::{Material, Object, Scene, Texture};
+use crate::{Material, Object, Scene, Texture, Wrap};
 use serde_json::{Map, Value, json};
 use std::{io::Write, sync::Arc};
 
@@ -15,7 +15,8 @@ const UNSIGNED_INT: u32 = 5125;
 ///
 /// Every object is a node of its own, in world space; occluders carry
 /// `{"aogauge":{"occluder":true}}` in their extras. The measure view is the
-/// orthographic camera `measure`, the look view the perspective camera `look`.
+/// orthographic camera `measure`, the look view the perspective camera `look`;
+/// both hold their numbers in `extras.aogauge`, as a scene file would.
 /// The environment, which glTF does not know, is left out.
 ///
 /// # Errors
@@ -46,7 +47,7 @@ fn pack(scene: &Scene) -> Result<Vec<u8>, String> {
     let lights = export_views::lights(&scene.lights);
     let (cameras, views) = export_views::nodes(scene);
     writer.nodes.extend(views);
-    let Writer { bin, views, accessors, meshes, materials, textures, images, nodes, strong, .. } = writer;
+    let Writer { bin, views, accessors, meshes, materials, textures, samplers, images, nodes, strong, .. } = writer;
     let mut used = Vec::new();
     if strong {
         used.push("KHR_materials_emissive_strength");
@@ -66,6 +67,7 @@ fn pack(scene: &Scene) -> Result<Vec<u8>, String> {
     list("meshes", meshes);
     list("materials", materials);
     list("textures", textures);
+    list("samplers", samplers);
     list("images", images);
     list("cameras", cameras);
     list("accessors", accessors);
@@ -90,6 +92,7 @@ struct Writer {
     nodes: Vec<Value>,
     materials: Vec<Value>,
     textures: Vec<Value>,
+    samplers: Vec<Value>,
     images: Vec<Value>,
     /// Whether any emission is above one.
     strong: bool,
@@ -123,7 +126,9 @@ impl Writer {
             .accessor(json!({ "bufferView": view, "componentType": UNSIGNED_INT, "count": count, "type": "SCALAR" }));
         // A texture needs coordinates; without them it shows nowhere.
         let mut material = object.material.clone();
-        material.texture = material.texture.filter(|_| !mesh.uvs.is_empty());
+        if mesh.uvs.is_empty() {
+            (material.texture, material.metallic_roughness_texture, material.emissive_texture) = (None, None, None);
+        }
         let material = self.material(&material)?;
         let mut node = json!({ "name": object.name, "mesh": self.meshes.len() });
         if object.occluder {
@@ -174,8 +179,8 @@ impl Writer {
         if !factors.iter().all(|f| (0.0..=1.0).contains(f)) {
             return Err("its base colour, metallic and roughness must be from 0 to 1".into());
         }
-        if !material.emissive.iter().all(|e| *e >= 0.0 && e.is_finite()) {
-            return Err("its emission must be 0 or more".into());
+        if !material.emissive.iter().all(|e| (0.0..=1e38).contains(e)) {
+            return Err("its emission must be from 0 to 1e38".into());
         }
         let mut pbr = json!({
             "baseColorFactor": [r, g, b, 1.0],
@@ -184,15 +189,26 @@ impl Writer {
         if let Some(texture) = &material.texture {
             pbr["baseColorTexture"] = json!({ "index": self.texture(texture)? });
         }
+        if let Some(texture) = &material.metallic_roughness_texture {
+            pbr["metallicRoughnessTexture"] = json!({ "index": self.texture(texture)? });
+        }
         // Sheets are lit on both sides.
         let mut json = json!({ "pbrMetallicRoughness": pbr, "doubleSided": true });
-        let strength = material.emissive.into_iter().fold(0.0, f32::max);
-        if strength > 1.0 {
-            // Above one, the factor holds the colour and the extension the rest.
+        if let Some(name) = &material.name {
+            json["name"] = name.as_str().into();
+        }
+        if let Some(texture) = &material.emissive_texture {
+            json["emissiveTexture"] = json!({ "index": self.texture(texture)? });
+        }
+        let brightest = material.emissive.into_iter().fold(0.0, f32::max);
+        if brightest > 1.0 {
+            // Above one, the factor holds the colour and the extension the rest: a
+            // power of two, which divides without rounding.
+            let strength = std::iter::successors(Some(2.0), |s| Some(s * 2.0)).find(|s| *s >= brightest).unwrap_or(1.0);
             json["emissiveFactor"] = json!(material.emissive.map(|e| e / strength));
             json["extensions"] = json!({ "KHR_materials_emissive_strength": { "emissiveStrength": strength } });
             self.strong = true;
-        } else if strength > 0.0 {
+        } else if brightest > 0.0 {
             json["emissiveFactor"] = json!(material.emissive);
         }
         self.materials.push(json);
@@ -206,9 +222,22 @@ impl Writer {
         }
         let view = self.view(texture::encode(texture)?, None);
         self.images.push(json!({ "bufferView": view, "mimeType": "image/png" }));
-        // Without a sampler a texture repeats, as ours do.
-        self.textures.push(json!({ "source": self.images.len() - 1 }));
+        let mut json = json!({ "source": self.images.len() - 1 });
+        // Without a sampler a texture repeats.
+        if texture.wrap != [Wrap::Repeat; 2] {
+            json["sampler"] = self.sampler(texture.wrap).into();
+        }
+        self.textures.push(json);
         self.known_textures.push(texture.clone());
         Ok(self.textures.len() - 1)
+    }
+
+    fn sampler(&mut self, wrap: [Wrap; 2]) -> usize {
+        let [s, t] = wrap.map(texture::wrap_code);
+        let sampler = json!({ "wrapS": s, "wrapT": t });
+        self.samplers.iter().position(|known| *known == sampler).unwrap_or_else(|| {
+            self.samplers.push(sampler);
+            self.samplers.len() - 1
+        })
     }
 }

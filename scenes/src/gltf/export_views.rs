@@ -1,7 +1,8 @@
 //! Cameras and lights out.
 
+use super::views;
 use crate::{Light, LightKind, Projection, Scene};
-use glam::{Mat3, Mat4, Vec3};
+use glam::{Mat4, Vec3};
 use serde_json::{Value, json};
 
 /// Distance of the look camera's near plane, metres.
@@ -21,18 +22,21 @@ pub(super) fn nodes(scene: &Scene) -> (Vec<Value>, Vec<Value>) {
         "measure",
         pose(measure.center + measure.normal * measure.clearance, -measure.normal, up),
         // From the near plane of the measure view to as far below the receiver.
-        orthographic("measure", half, 0.0, 2.0 * measure.clearance),
+        with_extras(orthographic("measure", half, 0.0, 2.0 * measure.clearance), views::of_measure(measure)),
     );
     let look = &scene.look;
     let [w, h] = look.resolution;
     add(
         "look",
         pose(look.eye, look.target - look.eye, Vec3::Y),
-        perspective("look", look.fov.to_radians(), Some(w as f32 / h as f32), NEAR, None),
+        with_extras(
+            perspective("look", look.fov.to_radians(), Some(w as f32 / h as f32), NEAR, None),
+            views::of_look(look),
+        ),
     );
     for c in &scene.cameras {
         // Those two of an exported scene have just been written.
-        if ["measure", "look"].contains(&c.name.as_str()) {
+        if views::CAMERAS.contains(&c.name.as_str()) {
             continue;
         }
         let camera = match c.projection {
@@ -54,10 +58,15 @@ pub(super) fn nodes(scene: &Scene) -> (Vec<Value>, Vec<Value>) {
 
 /// The matrix of a node that looks along `forward`, its -Z axis.
 fn pose(position: Vec3, forward: Vec3, up: Vec3) -> Mat4 {
-    let back = -forward.normalize_or(Vec3::NEG_Z);
+    let is_unit = (forward.length_squared() - 1.0).abs() < 1e-6;
+    let back = if is_unit { -forward } else { -forward.normalize_or(Vec3::NEG_Z) };
     let right = up.cross(back).normalize_or(Vec3::X);
-    let axes = Mat3::from_cols(right, back.cross(right), back);
-    Mat4::from_translation(position) * Mat4::from_mat3(axes)
+    Mat4::from_cols(right.extend(0.0), back.cross(right).extend(0.0), back.extend(0.0), position.extend(1.0))
+}
+
+fn with_extras(mut camera: Value, extras: Value) -> Value {
+    camera["extras"] = extras;
+    camera
 }
 
 fn perspective(name: &str, yfov: f32, aspect: Option<f32>, znear: f32, zfar: Option<f32>) -> Value {

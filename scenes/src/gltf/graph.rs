@@ -44,7 +44,8 @@ pub(super) fn walk(
             return Err(format!("{this} is nested more than {DEEPEST} deep"));
         }
         let local = transform(node).map_err(|e| format!("{this}: {e}"))?;
-        let world = above * local;
+        // Not even the sign of a zero changes where nothing is above.
+        let world = if above == DMat4::IDENTITY { local } else { above * local };
         if !world.is_finite() {
             return Err(format!("{this}: its transform is too large"));
         }

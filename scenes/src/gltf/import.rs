@@ -9,7 +9,7 @@ use super::{
     graph::{self, Placed},
     material::{Prepared, Wardrobe},
     names::{self, Unique},
-    punctual,
+    punctual, views,
 };
 use crate::{Mesh, Object};
 use glam::{DMat3, DMat4, Vec2, Vec3};
@@ -57,7 +57,9 @@ impl Reader<'_> {
     fn visit(&mut self, placed: &Placed<'_>, scale: f32) -> Result<(), String> {
         if let Some(index) = placed.node.camera {
             let def = get(&self.document.cameras, index, "camera", &placed.label())?;
-            self.out.cameras.push(punctual::camera(def, index, placed, scale)?);
+            let camera = punctual::camera(def, index, placed, scale)?;
+            views::read(def, index, &camera, &mut self.out)?;
+            self.out.cameras.push(camera);
         }
         if let Some(light) = &placed.node.extensions.light {
             let lights = self.document.extensions.lights.as_ref().map_or(&[][..], |l| &l.lights);
@@ -88,10 +90,10 @@ impl Reader<'_> {
             };
             let mut name = placed.node.name.clone().or(def.name.clone()).unwrap_or(format!("node{}", placed.index));
             if def.primitives.len() > 1 {
-                name = format!("{name}.{}", worn.name.as_deref().map_or_else(|| k.to_string(), str::to_owned));
+                name = format!("{name}.{}", worn.material.name.as_deref().map_or_else(|| k.to_string(), str::to_owned));
             }
             let name = self.unique.name(&name);
-            let also = def.name.as_deref().into_iter().chain(worn.name.as_deref()).chain([name.as_str()]);
+            let also = def.name.as_deref().into_iter().chain(worn.material.name.as_deref()).chain([name.as_str()]);
             self.out.names.push(placed.names.iter().cloned().chain(also.map(Into::into)).collect());
             self.out.objects.push(Object { name, occluder, material: worn.material.clone(), mesh });
         }

@@ -5,7 +5,7 @@
 //! columns, blocks of texels are taken together by their mean alpha.
 
 use super::accessor::Budget;
-use crate::{Mesh, Texture};
+use crate::{Mesh, Texture, Wrap};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::rc::Rc;
 
@@ -26,9 +26,10 @@ pub(super) struct Mask {
 }
 
 /// Sums of a texture's alpha over all rectangles from its corner, so that the
-/// mean over any rectangle of the repeated texture takes four look-ups.
+/// mean over any rectangle of the endless texture takes a few look-ups.
 pub(super) struct AlphaSums {
     size: [i64; 2],
+    wrap: [Wrap; 2],
     sums: Vec<u64>,
 }
 
@@ -43,22 +44,38 @@ impl AlphaSums {
                 sums[(y + 1) * (w + 1) + x + 1] = sums[y * (w + 1) + x + 1] + row;
             }
         }
-        AlphaSums { size: [w as i64, h as i64], sums }
+        AlphaSums { size: [w as i64, h as i64], wrap: texture.wrap, sums }
     }
 
-    /// Sum over the texels from the origin to (x, y) of the repeated texture.
-    fn sum(&self, x: i64, y: i64) -> i64 {
+    /// Sum over the texels from the origin to (x, y) of the endless texture.
+    fn sum(&self, x: i64, y: i64) -> i128 {
         let [w, h] = self.size;
-        let (qx, qy) = (x.div_euclid(w), y.div_euclid(h));
-        let (rx, ry) = (x.rem_euclid(w), y.rem_euclid(h));
-        let at = |x: i64, y: i64| self.sums[(y * (w + 1) + x) as usize] as i64;
-        qx * qy * at(w, h) + qx * at(w, ry) + qy * at(rx, h) + at(rx, ry)
+        let rows = prefix(y, h, self.wrap[1]);
+        let at = |x: i64, y: i64| i128::from(self.sums[(y * (w + 1) + x) as usize]);
+        let column = |x: i64| rows.iter().map(|&(n, y)| i128::from(n) * at(x, y)).sum::<i128>();
+        prefix(x, w, self.wrap[0]).iter().map(|&(n, x)| i128::from(n) * column(x)).sum()
     }
 
     /// Mean alpha, 0 to 1, of a block of texels.
     fn mean(&self, [x0, y0]: [i64; 2], [x1, y1]: [i64; 2]) -> f64 {
         let sum = self.sum(x1, y1) - self.sum(x0, y1) - self.sum(x1, y0) + self.sum(x0, y0);
         sum as f64 / ((x1 - x0) * (y1 - y0)) as f64 / 255.0
+    }
+}
+
+/// The sum over the first `x` texels of an endless row as sums over the first so
+/// many of the `n` there are: how often each is taken, and how many it is over.
+fn prefix(x: i64, n: i64, wrap: Wrap) -> [(i64, i64); 2] {
+    match wrap {
+        Wrap::Repeat => [(x.div_euclid(n), n), (1, x.rem_euclid(n))],
+        Wrap::Mirror => match (x.div_euclid(2 * n), x.rem_euclid(2 * n)) {
+            (q, r) if r <= n => [(2 * q, n), (1, r)],
+            // The way back takes away again what it has not yet come to.
+            (q, r) => [(2 * q + 2, n), (-1, 2 * n - r)],
+        },
+        Wrap::Clamp if x < 0 => [(x, 1), (0, 0)],
+        Wrap::Clamp if x > n => [(x - n + 1, n), (n - x, n - 1)],
+        Wrap::Clamp => [(1, x), (0, 0)],
     }
 }
 
@@ -107,12 +124,18 @@ impl Mask {
     fn opaque_part(&self, texture: &AlphaSums, uvs: [Vec2; 3]) -> Part {
         let whole = |is: bool| if is { Part::Whole } else { Part::Pieces(Vec::new()) };
         let [w, h] = texture.size;
-        let low = uvs.map(Vec2::as_dvec2).into_iter().fold(DVec2::INFINITY, DVec2::min).floor();
+        let lowest = uvs.map(Vec2::as_dvec2).into_iter().fold(DVec2::INFINITY, DVec2::min);
         let high = uvs.map(Vec2::as_dvec2).into_iter().fold(DVec2::NEG_INFINITY, DVec2::max);
-        if (high - low).max_element() > REPEATS {
+        // Whole repeats are taken off, so that what is far out loses no digits.
+        let repeats = |k: usize| match texture.wrap[k] {
+            Wrap::Repeat => lowest[k].floor(),
+            Wrap::Mirror => 2.0 * (lowest[k] / 2.0).floor(),
+            Wrap::Clamp => 0.0,
+        };
+        let low = DVec2::new(repeats(0), repeats(1));
+        if (high - low).max_element() > REPEATS || (lowest - low).min_element() < -REPEATS {
             return whole(self.opaque(texture.mean([0, 0], [w, h])));
         }
-        // Whole repeats are taken off, so that what is far out loses no digits.
         let texels = uvs.map(|uv| (uv.as_dvec2() - low) * DVec2::new(w as f64, h as f64));
         let (min, max) = (texels[0].min(texels[1]).min(texels[2]), texels[0].max(texels[1]).max(texels[2]));
         if (texels[1] - texels[0]).perp_dot(texels[2] - texels[0]) == 0.0 {
@@ -240,7 +263,7 @@ mod tests {
     fn checker(n: u32) -> Texture {
         let texels =
             (0..n * n).map(|i| [255, 255, 255, if (i % n + i / n).is_multiple_of(2) { 255 } else { 0 }]).collect();
-        Texture { size: [n, n], texels }
+        Texture { size: [n, n], wrap: [Wrap::Repeat; 2], texels }
     }
 
     fn quad(uv: f32) -> Mesh {
@@ -282,17 +305,53 @@ mod tests {
         // A band of opaque rows over a texture of more rows than are cut apart.
         let (w, h) = (4, 4096);
         let texels = (0..w * h).map(|i| [0, 0, 0, if i / w >= h / 2 { 255 } else { 0 }]).collect();
-        let cut = cut(&Texture { size: [w, h], texels }, &quad(100.0), 0.5);
+        let cut = cut(&Texture { size: [w, h], wrap: [Wrap::Repeat; 2], texels }, &quad(100.0), 0.5);
         assert!(cut.triangles.len() < 3000, "{}", cut.triangles.len());
         assert!((area(&cut) - 0.5).abs() < 0.3);
     }
 
     #[test]
     fn opaque_textures_leave_the_mesh_alone_and_empty_ones_leave_nothing() {
-        let texture = Texture { size: [2, 2], texels: vec![[0, 0, 0, 255]; 4] };
+        let texture = Texture { size: [2, 2], wrap: [Wrap::Repeat; 2], texels: vec![[0, 0, 0, 255]; 4] };
         assert_eq!(cut(&texture, &quad(1.0), 0.5), quad(1.0));
         assert!(cut(&texture, &quad(1.0), 1.5).triangles.is_empty());
         assert_eq!(cut(&texture, &quad(1e30), 0.5).triangles.len(), 2);
+    }
+
+    #[test]
+    fn the_mean_over_a_block_is_that_of_its_texels_however_it_wraps() {
+        let texels = (0..15).map(|i| [0, 0, 0, (i * 37 % 256) as u8]).collect();
+        let mut texture = Texture { size: [5, 3], wrap: [Wrap::Repeat; 2], texels };
+        for u in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
+            for v in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
+                texture.wrap = [u, v];
+                let sums = AlphaSums::new(&texture);
+                for (from, to) in [([-17, -9], [-3, -1]), ([-2, -7], [4, 8]), ([3, 1], [19, 11]), ([6, 4], [7, 5])] {
+                    let (mut sum, mut n) = (0.0, 0.0);
+                    for (x, y) in (from[0]..to[0]).flat_map(|x| (from[1]..to[1]).map(move |y| (x, y))) {
+                        let uv = Vec2::new((x as f32 + 0.5) / 5.0, (y as f32 + 0.5) / 3.0);
+                        sum += f64::from(texture.at(uv)[3]) / 255.0;
+                        n += 1.0;
+                    }
+                    let found = sums.mean(from, to);
+                    assert!((found - sum / n).abs() < 1e-12, "{u:?} {v:?} {from:?}: {found} {}", sum / n);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_clamped_mask_goes_on_beyond_its_edge() {
+        // Clear on the left, opaque on the right.
+        let halves = |wrap| Texture { size: [2, 1], wrap, texels: vec![[0; 4], [0, 0, 0, 255]] };
+        let mut mesh = quad(1.0);
+        mesh.uvs = mesh.uvs.iter().map(|uv| Vec2::new(uv.x * 4.0 - 1.0, uv.y)).collect();
+        for (wrap, wanted) in [(Wrap::Clamp, 0.625), (Wrap::Repeat, 0.5), (Wrap::Mirror, 0.5)] {
+            let cut = cut(&halves([wrap; 2]), &mesh, 0.5);
+            assert!((area(&cut) - wanted).abs() < 1e-6, "{wrap:?}: {}", area(&cut));
+        }
+        mesh.uvs.iter_mut().for_each(|uv| uv.x = uv.x * 1e30 + 1e30);
+        assert!(cut(&halves([Wrap::Clamp; 2]), &mesh, 0.5).triangles.len() <= 2);
     }
 
     #[test]

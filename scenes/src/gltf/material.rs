@@ -6,7 +6,10 @@ use super::{
     mask::{AlphaSums, Mask},
     texture,
 };
-use crate::{Material, Texture};
+use crate::{
+    Material, Texture, Wrap,
+    texture::{linear, srgb},
+};
 use glam::{Affine2, Vec2};
 use std::{collections::HashMap, rc::Rc, sync::Arc};
 
@@ -16,7 +19,6 @@ const MOST_TEXELS: u64 = 1 << 28;
 /// A material, and what a mesh needs to know to wear it.
 pub(super) struct Prepared {
     pub material: Material,
-    pub name: Option<Arc<str>>,
     /// Where its texture coordinates come from; None without a texture.
     pub coordinates: Option<Coordinates>,
     /// What is to be cut out.
@@ -24,10 +26,14 @@ pub(super) struct Prepared {
 }
 
 /// Which texture coordinates, and how they are moved.
+#[derive(Clone, PartialEq)]
 pub(super) struct Coordinates {
     pub attribute: String,
     pub map: Option<Affine2>,
 }
+
+/// An image and how it goes on beyond its edges.
+type Picture = (usize, [Wrap; 2]);
 
 /// Makes materials as they are asked for, so that what no mesh wears is not decoded.
 pub(super) struct Wardrobe<'a> {
@@ -35,8 +41,8 @@ pub(super) struct Wardrobe<'a> {
     buffers: &'a Buffers<'a>,
     files: &'a Files<'a>,
     materials: HashMap<Option<usize>, Rc<Prepared>>,
-    textures: HashMap<usize, Arc<Texture>>,
-    sums: HashMap<usize, Rc<AlphaSums>>,
+    textures: HashMap<Picture, Arc<Texture>>,
+    sums: HashMap<Picture, Rc<AlphaSums>>,
     texels_left: u64,
 }
 
@@ -60,7 +66,7 @@ impl<'a> Wardrobe<'a> {
             return Ok(known.clone());
         }
         let prepared = Rc::new(match index {
-            None => Prepared { material: Material::default(), name: None, coordinates: None, mask: None },
+            None => Prepared { material: Material::default(), coordinates: None, mask: None },
             Some(i) => {
                 let def = get(&self.document.materials, i, "material", asker)?;
                 self.prepare(def).map_err(|e| format!("{}: {e}", label("material", i, def.name.as_deref())))?
@@ -82,51 +88,111 @@ impl<'a> Wardrobe<'a> {
         if !(strength >= 0.0 && emissive.iter().all(|e| e.is_finite())) {
             return Err(format!("its emissiveStrength is {strength}: it must be 0 or more"));
         }
-        let image = pbr.base_color_texture.as_ref().map(|t| self.image_of(t)).transpose()?;
-        let texture = image.map(|i| self.texture(i)).transpose()?;
-        let mask = if def.alpha_mode == AlphaMode::Mask {
-            let cutoff = def.alpha_cutoff.unwrap_or(0.5);
-            if !(cutoff >= 0.0 && cutoff.is_finite()) {
-                return Err(format!("its alphaCutoff is {cutoff}: it must be 0 or more"));
-            }
-            Some(Mask { cutoff, alpha, texture: image.zip(texture.as_ref()).map(|(i, t)| self.sums(i, t)) })
-        } else {
-            None
-        };
-        Ok(Prepared {
+        let mut prepared = Prepared {
             material: Material {
+                name: def.name.clone(),
                 base_color: [r, g, b],
-                texture,
                 metallic: pbr.metallic_factor,
                 roughness: pbr.roughness_factor,
                 emissive,
+                ..Material::default()
             },
-            name: def.name.as_deref().map(Into::into),
-            coordinates: pbr.base_color_texture.as_ref().map(coordinates).transpose()?,
-            mask,
-        })
+            coordinates: None,
+            mask: None,
+        };
+        self.dress(def, &mut prepared)?;
+        if let Some(cutoff) = cutoff(def)? {
+            let sums = pbr.base_color_texture.as_ref().map(|t| self.sums(t)).transpose()?;
+            prepared.mask = Some(Mask { cutoff, alpha, texture: sums });
+        }
+        Ok(prepared)
     }
 
-    fn image_of(&self, reference: &TextureRef) -> Result<usize, String> {
+    /// Hangs up the textures. A mesh has one set of texture coordinates here: a
+    /// texture that is laid on by another than the first one's counts by its mean.
+    fn dress(&mut self, def: &MaterialDef, prepared: &mut Prepared) -> Result<(), String> {
+        let pbr = &def.pbr_metallic_roughness;
+        let mut fits = |reference: &TextureRef| {
+            let these = coordinates(reference)?;
+            let first = prepared.coordinates.get_or_insert_with(|| these.clone());
+            Ok::<bool, String>(*first == these)
+        };
+        let m = &mut prepared.material;
+        if let Some(reference) = &pbr.base_color_texture {
+            fits(reference)?;
+            m.texture = Some(self.texture(reference, "baseColorTexture")?);
+        }
+        if let Some(reference) = &pbr.metallic_roughness_texture {
+            let texture = self.texture(reference, "metallicRoughnessTexture")?;
+            if fits(reference)? {
+                m.metallic_roughness_texture = Some(texture);
+            } else {
+                let [_, roughness, metallic] = texture.mean(linear);
+                m.roughness *= roughness as f32;
+                m.metallic *= metallic as f32;
+            }
+        }
+        // What does not shine needs no picture of it.
+        let shines = m.emissive != [0.0; 3];
+        if let Some(reference) = def.emissive_texture.as_ref().filter(|_| shines) {
+            let texture = self.texture(reference, "emissiveTexture")?;
+            if fits(reference)? {
+                m.emissive_texture = Some(texture);
+            } else {
+                let mean = texture.mean(srgb);
+                m.emissive = std::array::from_fn(|k| m.emissive[k] * mean[k] as f32);
+            }
+        }
+        Ok(())
+    }
+
+    fn picture(&self, reference: &TextureRef, asker: &str) -> Result<Picture, String> {
         let this = label("texture", reference.index, None);
-        let texture = get(&self.document.textures, reference.index, "texture", "its baseColorTexture")?;
-        texture.source.ok_or_else(|| format!("{this} has no PNG or JPEG source"))
+        let texture = get(&self.document.textures, reference.index, "texture", asker)?;
+        let image = texture.source.ok_or_else(|| format!("{this} has no PNG or JPEG source"))?;
+        let Some(index) = texture.sampler else {
+            return Ok((image, [Wrap::Repeat; 2]));
+        };
+        let sampler = get(&self.document.samplers, index, "sampler", &this)?;
+        let wrap = |code, field| texture::wrap(code, field).map_err(|e| format!("sampler {index}: {e}"));
+        Ok((image, [wrap(sampler.wrap_s, "wrapS")?, wrap(sampler.wrap_t, "wrapT")?]))
     }
 
-    fn texture(&mut self, image: usize) -> Result<Arc<Texture>, String> {
-        if let Some(known) = self.textures.get(&image) {
+    fn texture(&mut self, reference: &TextureRef, field: &str) -> Result<Arc<Texture>, String> {
+        let asker = format!("its {field}");
+        let picture = self.picture(reference, &asker)?;
+        if let Some(known) = self.textures.get(&picture) {
             return Ok(known.clone());
         }
-        let bytes = self.buffers.image(image, self.files, "its baseColorTexture")?;
-        let texture = texture::decode(&bytes, &mut self.texels_left).map_err(|e| format!("image {image}: {e}"))?;
+        let (image, wrap) = picture;
+        let bytes = self.buffers.image(image, self.files, &asker)?;
+        let texture =
+            texture::decode(&bytes, wrap, &mut self.texels_left).map_err(|e| format!("image {image}: {e}"))?;
         let texture = Arc::new(texture);
-        self.textures.insert(image, texture.clone());
+        self.textures.insert(picture, texture.clone());
         Ok(texture)
     }
 
-    fn sums(&mut self, image: usize, texture: &Texture) -> Rc<AlphaSums> {
-        self.sums.entry(image).or_insert_with(|| Rc::new(AlphaSums::new(texture))).clone()
+    fn sums(&mut self, reference: &TextureRef) -> Result<Rc<AlphaSums>, String> {
+        let texture = self.texture(reference, "baseColorTexture")?;
+        let picture = self.picture(reference, "its baseColorTexture")?;
+        Ok(self.sums.entry(picture).or_insert_with(|| Rc::new(AlphaSums::new(&texture))).clone())
     }
+}
+
+/// Alpha from which on a surface is there, where it is not everywhere. A
+/// renderer here knows no half-clear surface: what is blended is there where it
+/// is at least half opaque.
+fn cutoff(def: &MaterialDef) -> Result<Option<f32>, String> {
+    let cutoff = match def.alpha_mode {
+        AlphaMode::Opaque => return Ok(None),
+        AlphaMode::Blend => 0.5,
+        AlphaMode::Mask => def.alpha_cutoff.unwrap_or(0.5),
+    };
+    if !(cutoff >= 0.0 && cutoff.is_finite()) {
+        return Err(format!("its alphaCutoff is {cutoff}: it must be 0 or more"));
+    }
+    Ok(Some(cutoff))
 }
 
 fn coordinates(reference: &TextureRef) -> Result<Coordinates, String> {

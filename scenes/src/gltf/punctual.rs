@@ -13,10 +13,16 @@ use std::f32::consts::FRAC_PI_2;
 fn pose(placed: &Placed<'_>) -> Result<(Vec3, Vec3, Vec3), String> {
     let axes = DMat3::from_mat4(placed.world);
     let none = || format!("{}: its transform leaves its camera or light no direction", placed.label());
-    let forward = (-axes.z_axis).try_normalize().ok_or_else(none)?;
+    let forward = unit(-axes.z_axis).ok_or_else(none)?;
     let up = (axes.y_axis - forward * forward.dot(axes.y_axis)).try_normalize().ok_or_else(none)?;
-    let position = placed.world.transform_point3(DVec3::ZERO);
+    let position = placed.world.w_axis.truncate();
     Ok((position.as_vec3(), forward.as_vec3(), up.as_vec3()))
+}
+
+/// The unit vector along `v`. One that is a unit vector already stays as it is,
+/// so that what is read, written and read again is the same to the bit.
+fn unit(v: DVec3) -> Option<DVec3> {
+    if (v.length_squared() - 1.0).abs() < 1e-6 { Some(v) } else { v.try_normalize() }
 }
 
 fn above_zero(value: f32, field: &str) -> Result<f32, String> {

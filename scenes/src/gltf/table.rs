@@ -14,13 +14,18 @@ pub(crate) struct GltfTable {
     file: String,
     /// Patterns of the names of nodes, meshes or materials that are the occluder
     /// under judgement; `*` stands for any text, `?` for one character.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     occluders: Vec<String>,
     /// Metres per unit of the model; 1 unless given.
     scale: Option<Positive>,
 }
 
 impl GltfTable {
+    /// A model whose occluders are marked in itself.
+    pub(crate) fn of(file: &str) -> Self {
+        GltfTable { file: file.to_owned(), occluders: Vec::new(), scale: None }
+    }
+
     /// Reads the model.
     pub(crate) fn load(&self, folder: Option<&Path>) -> Result<Imported, String> {
         let Some(folder) = folder else {

@@ -1,6 +1,6 @@
 //! Pictures: decoded under limits that follow from the bytes that are there.
 
-use crate::Texture;
+use crate::{Texture, Wrap};
 use image::{ExtendedColorType, ImageDecoder, ImageEncoder, ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
 
@@ -11,8 +11,25 @@ const LONGEST: u32 = 16384;
 /// of one bit. A header that claims more is lying.
 const TEXELS_A_BYTE: u64 = 1032 * 8;
 
+/// glTF's number of the wrap mode that repeats.
+pub(super) const REPEAT: u32 = 10497;
+
+/// glTF's numbers of the wrap modes.
+const WRAPS: [(u32, Wrap); 3] = [(REPEAT, Wrap::Repeat), (33071, Wrap::Clamp), (33648, Wrap::Mirror)];
+
+/// The wrap mode of a sampler's field.
+pub(super) fn wrap(code: u32, field: &str) -> Result<Wrap, String> {
+    let known = WRAPS.iter().find(|(c, _)| *c == code).map(|(_, wrap)| *wrap);
+    known.ok_or_else(|| format!("its {field} is {code}: {} are known", WRAPS.map(|(c, _)| c.to_string()).join(", ")))
+}
+
+/// The number of a wrap mode.
+pub(super) fn wrap_code(wrap: Wrap) -> u32 {
+    WRAPS.iter().find(|(_, w)| *w == wrap).map_or(REPEAT, |(code, _)| *code)
+}
+
 /// Decodes PNG or JPEG, taking its texels out of `left`.
-pub(super) fn decode(bytes: &[u8], left: &mut u64) -> Result<Texture, String> {
+pub(super) fn decode(bytes: &[u8], wrap: [Wrap; 2], left: &mut u64) -> Result<Texture, String> {
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
     if !matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg)) {
         return Err("it is neither PNG nor JPEG".into());
@@ -30,7 +47,7 @@ pub(super) fn decode(bytes: &[u8], left: &mut u64) -> Result<Texture, String> {
     }
     *left = left.checked_sub(texels).ok_or("with it, the textures have too many texels in all: use smaller ones")?;
     let image = image::DynamicImage::from_decoder(decoder).map_err(|e| one_line(&e))?.into_rgba8();
-    Ok(Texture { size: [width, height], texels: image.pixels().map(|p| p.0).collect() })
+    Ok(Texture { size: [width, height], wrap, texels: image.pixels().map(|p| p.0).collect() })
 }
 
 fn one_line(e: &image::ImageError) -> String {

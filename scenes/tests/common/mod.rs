@@ -2,9 +2,15 @@
 #![allow(clippy::unwrap_used, clippy::needless_pass_by_value, reason = "short calls count for more in tests")]
 #![allow(dead_code, reason = "every test file uses its own part")]
 
-use aogauge_scenes::gltf::{GltfError, Imported, import_bytes};
+use aogauge_scenes::{
+    Camera, Light, LightKind, Material, Projection, Scene, Texture, Wrap,
+    gltf::{GltfError, Imported, import_bytes},
+    library,
+};
 use base64::{Engine, engine::general_purpose::STANDARD};
+use glam::{Vec2, Vec3};
 use serde_json::{Value, json};
+use std::sync::Arc;
 
 /// A glTF document that grows a buffer.
 pub struct Builder {
@@ -156,4 +162,50 @@ pub fn everything() -> Builder {
     b.node(json!({ "name": "leaf", "mesh": mesh, "scale": [1, 2, 1] }));
     b.node(json!({ "name": "eye", "camera": 0, "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
     b
+}
+
+/// A scene with all that generated ones lack.
+pub fn rich() -> Scene {
+    let mut scene = library::scene("curtain-open").unwrap();
+    let texture = |seed: u8, wrap| {
+        let texels = (0..6).map(|i| [i * 40 + seed, 255 - i, 7, 100 + i]).collect();
+        Some(Arc::new(Texture { size: [3, 2], wrap, texels }))
+    };
+    let ground = &mut scene.objects[0];
+    ground.mesh.uvs = ground.mesh.positions.iter().map(|p| Vec2::new(p.x * 0.37, p.z)).collect();
+    ground.material = Material {
+        name: Some("ground".into()),
+        base_color: [0.1, 0.2, 0.3],
+        texture: texture(0, [Wrap::Clamp, Wrap::Mirror]),
+        metallic: 0.25,
+        roughness: 0.75,
+        metallic_roughness_texture: texture(1, [Wrap::Repeat; 2]),
+        emissive: [0.5, 12.3, 3.1],
+        emissive_texture: texture(2, [Wrap::Repeat, Wrap::Clamp]),
+    };
+    scene.objects[1].material.name = Some("red cloth".into());
+    scene.objects[1].material.emissive = [0.5, 0.25, 0.0];
+    let light = |name: &str, kind| Light {
+        name: name.into(),
+        kind,
+        position: Vec3::new(1.0, 2.0, -3.0),
+        direction: Vec3::new(0.6, -0.8, 0.0),
+        color: [1.0, 0.5, 0.25],
+        intensity: 80.0,
+        range: Some(7.5),
+    };
+    scene.lights = vec![
+        light("sun", LightKind::Directional),
+        light("bulb", LightKind::Point),
+        light("torch", LightKind::Spot { inner: 0.2, outer: 0.7 }),
+    ];
+    scene.lights[0].range = None;
+    scene.cameras = vec![Camera {
+        name: "side".into(),
+        position: Vec3::ONE,
+        forward: Vec3::X,
+        up: Vec3::Z,
+        projection: Projection::Perspective { fov_y: 1.0, aspect: None, near: 0.5, far: Some(9.0) },
+    }];
+    scene
 }
