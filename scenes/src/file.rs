@@ -2,7 +2,7 @@
 
 use crate::{
     AoScale, Material, Object, Scene,
-    bounded::{Albedo, NonNegative, Positive, check_name},
+    bounded::{Albedo, Fine, Radiance, check_name},
     derive,
     environment::EnvironmentFile,
     generators::Shape,
@@ -83,9 +83,9 @@ pub(crate) struct SceneFile {
 #[serde(deny_unknown_fields)]
 struct AoFile {
     /// R, length of a primary ray, metres.
-    radius: Positive,
+    radius: Fine<1_000, 1_000_000_000>,
     /// R', half length of a secondary ray, metres; R/4 unless given.
-    secondary_radius: Option<Positive>,
+    secondary_radius: Option<Fine<100, 1_000_000_000>>,
 }
 
 /// `[[object]]`: one shape with its material.
@@ -102,7 +102,7 @@ struct ObjectFile {
     /// Linear colour in place of `albedo`: red, green and blue.
     color: Option<[Albedo; 3]>,
     /// Radiance it sends out: red, green and blue.
-    emission: Option<[NonNegative; 3]>,
+    emission: Option<[Radiance<0, 1_000_000_000>; 3]>,
     /// What it looks like.
     shape: Shape,
 }

@@ -1,6 +1,6 @@
 //! Where a scene is measured from, and where its pictures are taken.
 
-use crate::bounded::{Positive, Triple};
+use crate::bounded::{Angle, Direction, Fine, Triple};
 use glam::Vec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -145,13 +145,13 @@ pub(crate) struct MeasureFile {
     /// The point of the receiver at the centre of the image, metres.
     center: Triple,
     /// Normal of the receiver, towards the occluder.
-    normal: Triple,
+    normal: Direction,
     /// Direction across the occluder, along the receiver.
-    transect: Triple,
+    transect: Direction,
     /// Height of the near plane over the receiver, metres: under the occluder.
-    clearance: Positive,
+    clearance: Fine<1, 1_000_000_000>,
     /// Edge of a pixel, metres; R/50 unless given, and no larger.
-    pixel: Option<Positive>,
+    pixel: Option<Fine<1, 1_000_000_000>>,
     /// Width and height in pixels.
     resolution: Resolution,
 }
@@ -190,7 +190,7 @@ pub(crate) struct LookFile {
     /// The point at the centre of the image, metres.
     target: Triple,
     /// Vertical field of view, degrees; 45 unless given.
-    fov: Option<Positive>,
+    fov: Option<Angle<1, 169>>,
     /// Width and height in pixels.
     resolution: Resolution,
 }
@@ -203,9 +203,6 @@ impl LookFile {
             return Err("look: the camera must not look straight up or down".into());
         }
         let fov = self.fov.map_or(45.0, |f| f.0);
-        if fov >= 170.0 {
-            return Err(format!("look.fov is {fov}: it must be below 170 degrees"));
-        }
         Ok(LookView { eye, target, fov, resolution: self.resolution.0 })
     }
 }

@@ -1,7 +1,7 @@
 //! `[gltf]` of a scene file.
 
 use super::Imported;
-use crate::bounded::Positive;
+use crate::bounded::Fine;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -17,7 +17,7 @@ pub(crate) struct GltfTable {
     #[serde(default)]
     occluders: Vec<String>,
     /// Metres per unit of the model; 1 unless given.
-    scale: Option<Positive>,
+    scale: Option<Fine<1, 1_000_000_000>>,
 }
 
 impl GltfTable {
