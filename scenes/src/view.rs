@@ -1,6 +1,6 @@
 //! Where a scene is measured from, and where its pictures are taken.
 
-use crate::bounded::{Angle, Direction, Fine, Triple};
+use crate::bounded::{Angle, Count, Direction, Fine, Triple};
 use glam::Vec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -121,22 +121,8 @@ impl LookView {
     }
 }
 
-/// Width and height in pixels, each 16 to 4096.
-#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
-#[serde(transparent)]
-struct Resolution([u32; 2]);
-
-impl<'de> Deserialize<'de> for Resolution {
-    fn deserialize<D: serde::Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-        let [w, h] = <[u32; 2]>::deserialize(d)?;
-        if [w, h].iter().any(|v| !(16..=4096).contains(v)) {
-            return Err(serde::de::Error::custom(format!(
-                "a resolution of {w} x {h} is out of range: 16 to 4096 pixels each way"
-            )));
-        }
-        Ok(Self([w, h]))
-    }
-}
+/// Width and height in pixels.
+type Resolution = [Count<16, 4096>; 2];
 
 /// `[measure]` of a scene file.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
@@ -176,7 +162,7 @@ impl MeasureFile {
             transect,
             clearance: self.clearance.0,
             pixel,
-            resolution: self.resolution.0,
+            resolution: self.resolution.map(|n| n.0),
         })
     }
 }
@@ -203,7 +189,7 @@ impl LookFile {
             return Err("look: the camera must not look straight up or down".into());
         }
         let fov = self.fov.map_or(45.0, |f| f.0);
-        Ok(LookView { eye, target, fov, resolution: self.resolution.0 })
+        Ok(LookView { eye, target, fov, resolution: self.resolution.map(|n| n.0) })
     }
 }
 

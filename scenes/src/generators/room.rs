@@ -39,7 +39,8 @@ impl Room {
         let side = self.window.width.0 / 2.0;
         if high >= y || side >= z {
             return Err(format!(
-                "room: the window (up to {high} m, {} m wide) must leave wall around it (room: {y} m high, {} m deep)",
+                "room: the window must leave wall around it: window.sill + window.height is {high} m, it must be below height {y} m; \
+                 window.width is {} m, it must be below depth {} m",
                 2.0 * side,
                 2.0 * z
             ));
