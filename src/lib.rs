@@ -8,6 +8,7 @@ pub mod golden;
 pub mod kit;
 pub mod layers;
 pub mod metrics;
+pub mod preview;
 pub mod record;
 pub mod render;
 pub mod report;

@@ -1,5 +1,9 @@
 //! Scene files: TOML in, [`Scene`] out, and errors that say where.
 
+mod resolved;
+
+pub use resolved::Parameters;
+
 use crate::{
     AoScale, Material, Object, Scene,
     bounded::{Albedo, Fine, Radiance, check_name},
@@ -125,6 +129,10 @@ impl ObjectFile {
 }
 
 impl SceneFile {
+    fn parse(file: &str, text: &str) -> Result<Self, SceneError> {
+        toml::from_str(text).map_err(|e| SceneError::Toml { file: file.to_owned(), source: Box::new(e) })
+    }
+
     fn build(self, name: &str, folder: Option<&Path>) -> Result<Scene, String> {
         check_name(name).map_err(|e| format!("the scene's name, its file's without the ending: {e}"))?;
         let mut objects = Vec::with_capacity(self.objects.len());
@@ -203,9 +211,9 @@ impl Scene {
     /// # Ok::<(), aogauge_scenes::SceneError>(())
     /// ```
     pub fn from_toml(name: &str, file: &str, text: &str, folder: Option<&Path>) -> Result<Scene, SceneError> {
-        let parsed: SceneFile =
-            toml::from_str(text).map_err(|e| SceneError::Toml { file: file.to_owned(), source: Box::new(e) })?;
-        parsed.build(name, folder).map_err(|message| SceneError::Invalid { file: file.to_owned(), message })
+        SceneFile::parse(file, text)?
+            .build(name, folder)
+            .map_err(|message| SceneError::Invalid { file: file.to_owned(), message })
     }
 
     /// Reads a scene file; its name is the file's, without the ending.

@@ -167,6 +167,19 @@ impl MeasureFile {
     }
 }
 
+impl From<&MeasureView> for MeasureFile {
+    fn from(view: &MeasureView) -> Self {
+        MeasureFile {
+            center: view.center.into(),
+            normal: view.normal.into(),
+            transect: view.transect.into(),
+            clearance: Fine(view.clearance),
+            pixel: Some(Fine(view.pixel)),
+            resolution: view.resolution.map(Count),
+        }
+    }
+}
+
 /// `[look]` of a scene file.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -190,6 +203,17 @@ impl LookFile {
         }
         let fov = self.fov.map_or(45.0, |f| f.0);
         Ok(LookView { eye, target, fov, resolution: self.resolution.map(|n| n.0) })
+    }
+}
+
+impl From<&LookView> for LookFile {
+    fn from(view: &LookView) -> Self {
+        LookFile {
+            eye: view.eye.into(),
+            target: view.target.into(),
+            fov: Some(Angle(view.fov)),
+            resolution: view.resolution.map(Count),
+        }
     }
 }
 

@@ -120,9 +120,7 @@ fn every_value_out_of_range_is_refused_by_name_and_range() {
             let others: String = all.iter().filter(|o| o.name != p.name).map(Parameter::line).collect();
             let refused = |value: &str| shape(family, &format!("{others}{} = {value}", p.name)).unwrap_err();
             let (bad, bounds) = match &p.kind {
-                Kind::Number { min, max, .. } => {
-                    (beyond(*min, *max).to_vec(), vec![format!("from {min} to {max}")])
-                }
+                Kind::Number { min, max, .. } => (beyond(*min, *max).to_vec(), vec![format!("from {min} to {max}")]),
                 Kind::Vector { min, max } => {
                     let each = |v: String| [format!("[{v}, 1, 1]"), format!("[1, {v}, 1]"), format!("[1, 1, {v}]")];
                     (beyond(*min, *max).into_iter().flat_map(each).collect(), vec![format!("from {min} to {max} m")])

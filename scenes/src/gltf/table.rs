@@ -21,6 +21,11 @@ pub(crate) struct GltfTable {
 }
 
 impl GltfTable {
+    /// Says what was left to defaults.
+    pub(crate) fn fill(&mut self) {
+        self.scale.get_or_insert(Fine(1.0));
+    }
+
     /// Reads the model.
     pub(crate) fn load(&self, folder: Option<&Path>) -> Result<Imported, String> {
         let Some(folder) = folder else {

@@ -74,10 +74,20 @@ impl Parameter {
 
 #[derive(Clone, Debug)]
 pub enum Kind {
-    Number { zero: bool, min: f64, max: f64 },
-    Count { min: u64, max: u64 },
+    Number {
+        zero: bool,
+        min: f64,
+        max: f64,
+    },
+    Count {
+        min: u64,
+        max: u64,
+    },
     /// Three numbers.
-    Vector { min: f64, max: f64 },
+    Vector {
+        min: f64,
+        max: f64,
+    },
     Choice(Vec<String>),
 }
 
@@ -141,9 +151,7 @@ fn values(kind: &Kind, required: bool) -> BoxedStrategy<Option<String>> {
         Kind::Count { min, max } => {
             prop_oneof![8 => min..=max.min(min + 40), 1 => min..=max.min(2000)].prop_map(|n| n.to_string()).boxed()
         }
-        Kind::Number { zero, min, max } => {
-            number(if zero { 0.0 } else { min }, min, max)
-        }
+        Kind::Number { zero, min, max } => number(if zero { 0.0 } else { min }, min, max),
         Kind::Vector { min, max } => {
             [(); 3].map(|()| number(min, min, max)).prop_map(|[x, y, z]| format!("[{x}, {y}, {z}]")).boxed()
         }
