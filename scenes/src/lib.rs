@@ -24,7 +24,7 @@ mod scene;
 mod view;
 mod views_json;
 
-pub use bounded::check_name;
+pub use bounded::{Count, check_name};
 pub use camera::{Camera, Projection};
 pub use environment::{Environment, Portal, Sky};
 pub use file::{Parameters, SceneError};
