@@ -134,7 +134,9 @@ fn without_sparks(light: &[f32], [width, height]: [u32; 2]) -> Vec<f32> {
         let mut around: Vec<f32> =
             near(y, height).flat_map(|v| near(x, width).map(move |u| point(u, v))).filter(|l| l.is_finite()).collect();
         around.sort_by(f32::total_cmp);
-        around.get(around.len() / 2).map_or(point(x, y), |median| point(x, y).min(2.0 * median))
+        let most = around.get(around.len() / 2).map_or(f32::INFINITY, |median| 2.0 * median);
+        // Where there is no surface, NaN stays.
+        if point(x, y) > most { most } else { point(x, y) }
     };
     (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| held(x, y)).collect()
 }
