@@ -14,7 +14,7 @@ const CONTACT: f32 = 1e-5;
 /// How far round its centre a view is kept clear of the occluder, in R.
 const CLEAR: f32 = 2.5;
 /// Directions of receivers that are tried, at most.
-const MAX_GROUPS: usize = 16;
+const MAX_GROUPS: usize = 64;
 
 /// A point of the sheet with the receiver under it.
 struct Stand {
@@ -28,10 +28,15 @@ impl Stand {
     fn faces(&self, normal: Vec3) -> bool {
         self.normal.dot(normal) > 0.95
     }
+
+    /// Whether its receiver lies about in the plane of another's.
+    fn beside(&self, other: &Stand, radius: f32) -> bool {
+        self.faces(other.normal) && other.normal.dot(self.base - other.base).abs() < 0.1 * radius
+    }
 }
 
 /// A measure view under the part of the occluder that comes nearest to a
-/// receiver: centred below its edge, the transect across it, the near plane at
+/// receiver, a floor where there is one: centred below its edge, the transect across it, the near plane at
 /// 0.8 of the least height of the occluder within 2.5 R, 2 R to each side at
 /// R/50 a pixel.
 ///
@@ -48,18 +53,19 @@ pub(crate) fn measure(objects: &[Object], radius: f32) -> Result<MeasureView, St
     let all = stands(objects, radius);
     let mut left: Vec<&Stand> = all.iter().filter(|s| s.gap > LEAST_GAP * radius).collect();
     let mut refused = None;
-    // Under the largest group of stands first; a leg's side must not hide its end.
+    // Floors first, then the largest group of stands, until one has room: what
+    // hangs between pillars comes near many of their sides.
     for _ in 0..MAX_GROUPS {
-        let count = |n: Vec3| left.iter().filter(|s| s.faces(n)).count();
-        let Some(normal) = left.iter().max_by_key(|s| count(s.normal)).map(|s| s.normal) else {
+        let count = |leader: &Stand| left.iter().filter(|s| s.beside(leader, radius)).count();
+        let Some(&leader) = left.iter().max_by_key(|s| (s.faces(Vec3::Y), count(s))) else {
             break;
         };
-        let group: Vec<&Stand> = left.iter().copied().filter(|s| s.faces(normal)).collect();
-        match under(objects, &group, normal, radius) {
+        let group: Vec<&Stand> = left.iter().copied().filter(|s| s.beside(leader, radius)).collect();
+        match under(objects, &group, leader.normal, radius) {
             Ok(view) => return Ok(view),
             Err((center, height)) => refused = refused.or_else(|| Some(too_low(&all, center, height, radius))),
         }
-        left.retain(|s| !s.faces(normal));
+        left.retain(|s| !s.beside(leader, radius) && !std::ptr::eq(*s, leader));
     }
     let why = refused.unwrap_or_else(|| no_stand(&all, radius));
     Err(format!("measure is not given and cannot be found: {why}, or give [measure]"))
