@@ -146,13 +146,21 @@ fn a_run_leaves_a_record_and_a_report() {
 fn broken_scenes_are_named_by_file_and_line() {
     type Change = fn(String) -> String;
     let cases: [(&str, Change, &[&str]); 12] = [
-        ("no light", |s| s.replace("radiance = 1.0", "radiance = 0"), &["scene.toml", "line 7", "above 0"]),
+        (
+            "no light",
+            |s| s.replace("radiance = 1.0", "radiance = 0"),
+            &["scene.toml", "line 7", "from 0.001 to 1000000"],
+        ),
         (
             "unknown key",
             |s| s.replace("radius = 0.25", "radius = 0.25\ncolour = 3"),
             &["scene.toml", "line 5", "colour"],
         ),
-        ("negative radius", |s| s.replace("radius = 0.25", "radius = -0.25"), &["scene.toml", "line 4", "above 0"]),
+        (
+            "negative radius",
+            |s| s.replace("radius = 0.25", "radius = -0.25"),
+            &["scene.toml", "line 4", "from 0.001 to 1000 m"],
+        ),
         (
             "NaN vertex",
             |s| {
@@ -503,10 +511,22 @@ fn a_scene_can_be_shown_and_taken_elsewhere() {
         printed.contains("second-curtain") && printed.contains("occluder") && printed.contains("bounds"),
         "{printed}"
     );
+    for expected in [
+        "secondary_radius = 0.0625",
+        "folds = \"flat\"",
+        "second-curtain         12 triangles            [-0.01, 0.03, -3] to [0.01, 3, -0.6] m  albedo 0.3",
+        "triangles    56 in 4 objects",
+        "occluders    1, 12 triangles",
+        "environment  uniform sky of radiance 1, 1 portal",
+    ] {
+        assert!(printed.contains(expected), "no {expected} in\n{printed}");
+    }
     assert!(fs::read(&preview).unwrap().starts_with(b"\x89PNG"));
     let json: Value =
         serde_json::from_slice(&aogauge(&["scene", "show", "pillar", "--format", "json"]).stdout).unwrap();
-    assert_eq!(json["radius"], 0.25);
+    assert_eq!(json["parameters"]["ao"]["secondary_radius"], 0.0625);
+    assert_eq!(json["parameters"]["object"][2]["shape"]["curtain"]["at"]["z"], 1.55);
+    assert_eq!(json["objects"][2]["material"]["base_color"][0], 0.3);
     expect(2, &["scene", "show", "piller"]);
 
     let kit = dir.path().join("kit");
@@ -534,7 +554,8 @@ fn a_scene_can_be_shown_and_taken_elsewhere() {
     .unwrap();
     let json: Value =
         serde_json::from_slice(&aogauge(&["scene", "show", text(&own), "--format", "json"]).stdout).unwrap();
-    assert_eq!(json["triangles"], 56, "{json}");
-    assert!(json["parameters"].as_str().unwrap().contains("kit/pillar.glb"), "the file's own text: {json}");
+    assert_eq!(json["totals"]["triangles"], 56, "{json}");
+    assert_eq!(json["parameters"]["gltf"]["file"], "kit/pillar.glb", "{json}");
+    assert!(json["parameters"]["measure"]["clearance"].as_f64().unwrap() > 0.0, "{json}");
     assert!(expect(2, &["scene", "show", "kit/pillar.glb"]).contains("[gltf]"));
 }

@@ -22,10 +22,10 @@ fn every_legal_parameter_set_gives_a_scene_that_renders() {
                 let Ok(mut scene) = scene(family, &text) else {
                     return Ok(());
                 };
-                // Shapes may be 100 m large and 100 m off, which asks for a larger R
-                // than a curtain's.
-                scene.ao.radius = 1.0;
-                scene.ao.secondary_radius = 0.25;
+                // Shapes may be 100 m large and 100 m off, planes and blocks 100 km,
+                // which asks for a larger R than a curtain's.
+                scene.ao.radius = if ["plane", "block"].contains(&family) { 1000.0 } else { 1.0 };
+                scene.ao.secondary_radius = scene.ao.radius / 4.0;
                 let geometry = Geometry::new(&scene).unwrap_or_else(|e| panic!("{family}: {text}: {e}"));
                 let view = scene.look.view();
                 let estimator = Estimator::extended(ReceiverPlane::Clipped);

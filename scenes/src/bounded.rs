@@ -5,58 +5,6 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 use std::{borrow::Cow, fmt::Display};
 
-/// A finite number, as f32.
-fn finite<'de, D: Deserializer<'de>>(d: D) -> Result<f32, D::Error> {
-    let value = f64::deserialize(d)?;
-    if !value.is_finite() || value.abs() > 1e12 {
-        return Err(D::Error::custom(format!("{value} is not allowed here: give a finite number of at most 1e12")));
-    }
-    Ok(value as f32)
-}
-
-macro_rules! bounded {
-    ($(#[$doc:meta])* $name:ident, $holds:expr, $range:literal, $schema:literal = $bound:literal) => {
-        $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-        #[serde(transparent)]
-        pub struct $name(#[schemars(extend($schema = $bound))] pub f32);
-
-        impl<'de> Deserialize<'de> for $name {
-            fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-                let value = finite(d)?;
-                let holds: fn(f32) -> bool = $holds;
-                if holds(value) {
-                    Ok(Self(value))
-                } else {
-                    Err(out_of_range(value, $range))
-                }
-            }
-        }
-    };
-}
-
-bounded!(
-    /// A length, radius or radiance above zero.
-    Positive,
-    |v| v > 0.0,
-    "above 0",
-    "exclusiveMinimum" = 0
-);
-bounded!(
-    /// A length of zero or more.
-    NonNegative,
-    |v| v >= 0.0,
-    "0 or more",
-    "minimum" = 0
-);
-bounded!(
-    /// A diffuse albedo: 0 reflects nothing, 1 would reflect everything.
-    Albedo,
-    |v| (0.0..1.0).contains(&v),
-    "from 0 up to, but not including, 1",
-    "minimum" = 0
-);
-
 /// The complaint about a number outside its range.
 fn out_of_range<E: Error>(value: impl Display, range: impl Display) -> E {
     E::custom(format!("{value} is out of range: it must be {range}"))
@@ -111,8 +59,29 @@ ranged!(
     /// A length in metres; its bounds are in millimetres.
     Length,
     u32,
-    1000.0f32,
+    1e3f32,
     " m"
+);
+ranged!(
+    /// A length in metres that may be very small; its bounds are in micrometres.
+    Fine,
+    u32,
+    1e6f32,
+    " m"
+);
+ranged!(
+    /// Radiance, up to the environment's factor; its bounds are in thousandths.
+    Radiance,
+    u32,
+    1e3f32,
+    ""
+);
+ranged!(
+    /// A part of a vector whose length means nothing.
+    Component,
+    i32,
+    1.0f32,
+    ""
 );
 ranged!(
     /// An angle in degrees.
@@ -124,9 +93,16 @@ ranged!(
 
 /// A whole number between two bounds: what a shape makes so many of is always
 /// capped, so that no parameter allocates without bound.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(transparent)]
 pub struct Count<const MIN: u32, const MAX: u32>(pub u32);
+
+impl<const MIN: u32, const MAX: u32> Count<MIN, MAX> {
+    /// The number.
+    pub fn get(self) -> u32 {
+        self.0
+    }
+}
 
 impl<'de, const MIN: u32, const MAX: u32> Deserialize<'de> for Count<MIN, MAX> {
     fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
@@ -154,30 +130,27 @@ impl<const MIN: u32, const MAX: u32> JsonSchema for Count<MIN, MAX> {
 }
 
 /// How thick a sheet is, metres: 0 is a single, open layer of triangles; what is
-/// thicker is a closed solid.
+/// thicker is a closed solid. Bounds are in micrometres. Unless told otherwise,
+/// 0.0001 m, below which the two faces fall together in 32-bit coordinates, to
+/// 100 m.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(transparent)]
-pub struct Thickness(pub f32);
+pub struct Thickness<const MIN: u32 = 100, const MAX: u32 = 100_000_000>(pub f32);
 
-impl Thickness {
-    /// The thinnest solid, metres: below it the two faces fall together in 32-bit
-    /// coordinates.
-    const MIN: f32 = 1e-4;
-    /// The thickest, metres.
-    const MAX: f32 = 100.0;
-}
-
-impl<'de> Deserialize<'de> for Thickness {
+impl<'de, const MIN: u32, const MAX: u32> Deserialize<'de> for Thickness<MIN, MAX> {
     fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-        let value = finite(d)?;
-        if value == 0.0 || (Self::MIN..=Self::MAX).contains(&value) {
+        let given = f64::deserialize(d)?;
+        let value = given as f32;
+        let (min, max) = (MIN as f32 / 1e6, MAX as f32 / 1e6);
+        if value == 0.0 || (min..=max).contains(&value) {
             return Ok(Self(value));
         }
-        Err(out_of_range(value, format_args!("0, for a single sheet, or from {} to {} m", Self::MIN, Self::MAX)))
+        let kind = if given.is_finite() { "" } else { "a finite number: " };
+        Err(out_of_range(given, format_args!("{kind}0, for a single sheet, or from {min} to {max} m")))
     }
 }
 
-impl JsonSchema for Thickness {
+impl<const MIN: u32, const MAX: u32> JsonSchema for Thickness<MIN, MAX> {
     fn inline_schema() -> bool {
         true
     }
@@ -187,7 +160,38 @@ impl JsonSchema for Thickness {
     }
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "type": "number", "anyOf": [{ "const": 0 }, { "minimum": 1e-4, "maximum": Self::MAX }] })
+        let (min, max) = (f64::from(MIN) / 1e6, f64::from(MAX) / 1e6);
+        json_schema!({ "type": "number", "anyOf": [{ "const": 0 }, { "minimum": min, "maximum": max }] })
+    }
+}
+
+/// A diffuse albedo: 0 reflects nothing, 1 would reflect everything.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(transparent)]
+pub struct Albedo(pub f32);
+
+impl<'de> Deserialize<'de> for Albedo {
+    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        let given = f64::deserialize(d)?;
+        let value = given as f32;
+        if (0.0..1.0).contains(&value) {
+            return Ok(Self(value));
+        }
+        Err(out_of_range(given, "a finite number from 0 up to, but not including, 1"))
+    }
+}
+
+impl JsonSchema for Albedo {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Albedo".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "number", "minimum": 0, "exclusiveMaximum": 1 })
     }
 }
 
@@ -209,29 +213,41 @@ impl Default for Coordinate {
     }
 }
 
-/// A point or vector of finite coordinates.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+/// A point, or the way from one point to another, metres.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(transparent)]
-pub struct Triple(pub [f32; 3]);
+#[schemars(inline)]
+pub struct Triple(pub [Offset<-100_000, 100_000>; 3]);
 
 impl Triple {
     /// As a glam vector.
     pub fn vec(self) -> glam::Vec3 {
-        glam::Vec3::from_array(self.0)
+        glam::Vec3::from_array(self.0.map(|c| c.0))
     }
 }
 
-struct Finite(f32);
-
-impl<'de> Deserialize<'de> for Finite {
-    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-        finite(d).map(Self)
+impl From<glam::Vec3> for Triple {
+    fn from(v: glam::Vec3) -> Self {
+        Triple(v.to_array().map(Offset))
     }
 }
 
-impl<'de> Deserialize<'de> for Triple {
-    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-        <[Finite; 3]>::deserialize(d).map(|v| Self(v.map(|c| c.0)))
+/// A vector whose length means nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(transparent)]
+#[schemars(inline)]
+pub struct Direction(pub [Component<-1_000, 1_000>; 3]);
+
+impl Direction {
+    /// As a glam vector.
+    pub fn vec(self) -> glam::Vec3 {
+        glam::Vec3::from_array(self.0.map(|c| c.0))
+    }
+}
+
+impl From<glam::Vec3> for Direction {
+    fn from(v: glam::Vec3) -> Self {
+        Direction(v.to_array().map(Component))
     }
 }
 

@@ -1,65 +1,156 @@
 //! Views for scenes that give none: found from the sheet and the receiver.
 
 use crate::{LookView, MeasureView, Object, closest_point};
-use glam::{Mat3, Vec3};
+use glam::{Vec2, Vec3};
 
 /// Points of the sheet that are looked at, at most.
-const SAMPLES: usize = 512;
+const SAMPLES: usize = 4096;
+/// Samples that share a box, so that most triangles are passed over together.
+const CLUSTER: usize = 64;
+/// A gap below this share of R is too small to look into.
+const LEAST_GAP: f32 = 1e-3;
+/// A gap below this, metres, is taken for contact.
+const CONTACT: f32 = 1e-5;
+/// How far round its centre a view is kept clear of the occluder, in R.
+const CLEAR: f32 = 2.5;
+/// Directions of receivers that are tried, at most.
+const MAX_GROUPS: usize = 64;
 
 /// A point of the sheet with the receiver under it.
 struct Stand {
-    sheet: Vec3,
     base: Vec3,
     normal: Vec3,
     gap: f32,
 }
 
-/// A triangle with its bounds.
-struct Boxed {
-    min: Vec3,
-    max: Vec3,
-    corners: [Vec3; 3],
+impl Stand {
+    /// Whether its receiver faces about this way.
+    fn faces(&self, normal: Vec3) -> bool {
+        self.normal.dot(normal) > 0.95
+    }
+
+    /// Whether its receiver lies about in the plane of another's.
+    fn beside(&self, other: &Stand, radius: f32) -> bool {
+        self.faces(other.normal) && other.normal.dot(self.base - other.base).abs() < 0.1 * radius
+    }
 }
 
 /// A measure view under the part of the occluder that comes nearest to a
-/// receiver: centred below its edge, the transect across it, the near plane at
-/// 0.8 of the gap, 2 R to each side at R/50 a pixel.
+/// receiver, a floor where there is one: centred below its edge, the transect across it, the near plane at
+/// 0.8 of the least height of the occluder within 2.5 R, 2 R to each side at
+/// R/50 a pixel.
+///
+/// The transect runs across the long direction of the edge. Under a base that
+/// is about as wide as long there is none; then it is the first of the axes x, y
+/// and z that lies more across the normal than along it.
 ///
 /// # Errors
 /// A sentence that says what is missing.
 pub(crate) fn measure(objects: &[Object], radius: f32) -> Result<MeasureView, String> {
-    let stands = stands(objects, radius);
-    let facing = |s: &Stand, n: Vec3| s.normal.dot(n) > 0.95;
-    let count = |n: Vec3| stands.iter().filter(|s| facing(s, n)).count();
-    let leader = stands.iter().max_by_key(|s| count(s.normal)).ok_or_else(|| {
-        format!("measure is not given and cannot be found: no part of an occluder comes within ao.radius = {radius} m of another object")
-    })?;
-    let normal = leader.normal;
-    let group: Vec<&Stand> = stands.iter().filter(|s| facing(s, normal)).collect();
+    if !objects.iter().any(|o| o.occluder) {
+        return Err("measure is not given and cannot be found: the scene has no occluder; give [measure], or mark an object with occluder = true".into());
+    }
+    let all = stands(objects, radius);
+    let mut left: Vec<&Stand> = all.iter().filter(|s| s.gap > LEAST_GAP * radius).collect();
+    let mut refused = None;
+    // Floors first, then the largest group of stands, until one has room: what
+    // hangs between pillars comes near many of their sides.
+    for _ in 0..MAX_GROUPS {
+        let count = |leader: &Stand| left.iter().filter(|s| s.beside(leader, radius)).count();
+        let Some(&leader) = left.iter().max_by_key(|s| (s.faces(Vec3::Y), count(s))) else {
+            break;
+        };
+        let group: Vec<&Stand> = left.iter().copied().filter(|s| s.beside(leader, radius)).collect();
+        match under(objects, &group, leader.normal, radius) {
+            Ok(view) => return Ok(view),
+            Err((center, height)) => refused = refused.or_else(|| Some(too_low(&all, center, height, radius))),
+        }
+        left.retain(|s| !s.beside(leader, radius) && !std::ptr::eq(*s, leader));
+    }
+    let why = refused.unwrap_or_else(|| no_stand(&all, radius));
+    Err(format!("measure is not given and cannot be found: {why}, or give [measure]"))
+}
+
+/// The view under the lowest of stands that face one way; its centre and the
+/// least height there where that is too low.
+fn under(objects: &[Object], group: &[&Stand], normal: Vec3, radius: f32) -> Result<MeasureView, (Vec3, f32)> {
     let lowest = group.iter().map(|s| s.gap).fold(f32::INFINITY, f32::min);
-    let edge: Vec<&&Stand> = group.iter().filter(|s| s.gap <= lowest + 0.1 * radius).collect();
-    let mean = edge.iter().map(|s| s.base).sum::<Vec3>() / edge.len() as f32;
-    let Some(middle) = edge.iter().min_by(|a, b| a.base.distance(mean).total_cmp(&b.base.distance(mean))) else {
-        return Err("measure is not given and cannot be found".into());
-    };
-    let along = longest_axis(edge.iter().map(|s| s.base - mean), normal);
-    let across = along.cross(normal).normalize_or_zero();
+    let edge: Vec<Vec3> = group.iter().filter(|s| s.gap <= lowest + 0.1 * radius).map(|s| s.base).collect();
+    let mean = edge.iter().sum::<Vec3>() / edge.len() as f32;
+    let center = edge.iter().copied().min_by(|a, b| a.distance(mean).total_cmp(&b.distance(mean))).unwrap_or(mean);
+    let transect = transect(&edge, mean, normal);
+    let height = least_height(objects, center, normal, transect, radius);
+    if height <= LEAST_GAP * radius {
+        return Err((center, height));
+    }
+    Ok(MeasureView { center, normal, transect, clearance: 0.8 * height, pixel: radius / 50.0, resolution: [208, 32] })
+}
+
+/// Why no part of the occluder stands over a receiver.
+fn no_stand(all: &[Stand], radius: f32) -> String {
+    let gap = all.iter().map(|s| s.gap).fold(0.0, f32::max);
+    if all.is_empty() {
+        format!(
+            "no part of an occluder stands over another object within ao.radius = {radius} m; give a larger ao.radius, up to 1000 m"
+        )
+    } else if gap > CONTACT {
+        too_small(gap, radius)
+    } else {
+        "the occluder touches what it stands on and leaves no gap to look into; raise it".into()
+    }
+}
+
+/// Why a view centred here would see the occluder.
+fn too_low(all: &[Stand], center: Vec3, height: f32, radius: f32) -> String {
+    if height > CONTACT {
+        too_small(height, radius)
+    } else {
+        let contact = all
+            .iter()
+            .filter(|s| s.gap <= CONTACT)
+            .map(|s| s.base)
+            .min_by(|a, b| a.distance(center).total_cmp(&b.distance(center)))
+            .unwrap_or(center);
+        format!(
+            "the occluder touches or crosses what it stands on near {contact} and leaves no gap to look into; raise it"
+        )
+    }
+}
+
+fn too_small(gap: f32, radius: f32) -> String {
+    format!(
+        "the occluder stands only {gap} m over another object, less than 1/1000 of ao.radius = {radius} m; give a smaller ao.radius, down to 0.001 m"
+    )
+}
+
+/// The direction across the edge's long one, as [`measure`] says.
+fn transect(edge: &[Vec3], mean: Vec3, normal: Vec3) -> Vec3 {
+    let x = normal.any_orthonormal_vector();
+    let y = normal.cross(x);
+    let (xx, xy, yy) = edge.iter().map(|p| Vec2::new((*p - mean).dot(x), (*p - mean).dot(y))).fold(
+        (0.0f64, 0.0f64, 0.0f64),
+        |(xx, xy, yy), p| {
+            let (a, b) = (f64::from(p.x), f64::from(p.y));
+            (xx + a * a, xy + a * b, yy + b * b)
+        },
+    );
+    let (middle, half) = ((xx + yy) / 2.0, ((xx - yy) / 2.0).hypot(xy));
+    // Less than three times as long as wide, by standard deviation.
+    if middle - half > (middle + half) / 9.0 {
+        return axis_across(normal);
+    }
+    // The eigenvector of the smaller eigenvalue: a quarter turn off the larger's.
+    let angle = 0.5 * (2.0 * xy).atan2(xx - yy) + std::f64::consts::FRAC_PI_2;
+    let across = x * angle.cos() as f32 + y * angle.sin() as f32;
     let largest = across.to_array().into_iter().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(1.0);
-    let transect = snapped(if largest < 0.0 { -across } else { across }, normal);
-    // Under everything that the view spans, not only under its middle.
-    let clear = group
-        .iter()
-        .filter(|s| s.base.distance(middle.base) < 2.5 * radius)
-        .map(|s| normal.dot(s.sheet - middle.base))
-        .fold(f32::INFINITY, f32::min);
-    Ok(MeasureView {
-        center: middle.base,
-        normal,
-        transect,
-        clearance: 0.8 * clear,
-        pixel: radius / 50.0,
-        resolution: [208, 32],
-    })
+    snapped(if largest < 0.0 { -across } else { across }, normal)
+}
+
+/// The first world axis that lies more across `normal` than along it, laid into
+/// the plane across it.
+fn axis_across(normal: Vec3) -> Vec3 {
+    let axis = [Vec3::X, Vec3::Y, Vec3::Z].into_iter().find(|a| a.dot(normal).abs() < 0.7).unwrap_or(Vec3::X);
+    (axis - normal * normal.dot(axis)).normalize_or_zero()
 }
 
 /// The world axis across `normal` within a degree of a direction, or else the
@@ -70,6 +161,49 @@ fn snapped(direction: Vec3, normal: Vec3) -> Vec3 {
         .map(|axis| (axis - normal * normal.dot(axis)).normalize_or_zero())
         .find(|axis| axis.dot(direction) > 0.999_85)
         .unwrap_or(direction)
+}
+
+/// The least height over the receiver's plane at which any part of the occluder
+/// is met within 2.5 R of the centre, to each side and upwards; R where there is
+/// none. What lies wholly under the receiver does not count.
+fn least_height(objects: &[Object], center: Vec3, normal: Vec3, transect: Vec3, radius: f32) -> f32 {
+    let (reach, floor) = (CLEAR * radius, -LEAST_GAP * radius);
+    let along = normal.cross(transect);
+    let sphere = Vec3::splat(reach * 3.0f32.sqrt());
+    let (low, high) = (center - sphere, center + sphere);
+    let mut least = radius;
+    for [a, b, c] in objects.iter().filter(|o| o.occluder).flat_map(|o| o.mesh.corners()) {
+        if a.min(b).min(c).cmpgt(high).any() || a.max(b).max(c).cmplt(low).any() {
+            continue;
+        }
+        let local = [a, b, c].map(|p| {
+            let d = p - center;
+            Vec3::new(d.dot(transect), d.dot(along), d.dot(normal))
+        });
+        let mut part = local.to_vec();
+        for side in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y] {
+            part = cut(&part, |p| reach - p.dot(side));
+        }
+        part = cut(&part, |p| p.z - floor);
+        least = part.iter().map(|p| p.z).fold(least, f32::min);
+    }
+    least
+}
+
+/// The part of a convex polygon where `inside` is 0 or more.
+fn cut(polygon: &[Vec3], inside: impl Fn(Vec3) -> f32) -> Vec<Vec3> {
+    let mut kept = Vec::with_capacity(polygon.len() + 1);
+    for (i, &a) in polygon.iter().enumerate() {
+        let b = polygon[(i + 1) % polygon.len()];
+        let (da, db) = (inside(a), inside(b));
+        if da >= 0.0 {
+            kept.push(a);
+        }
+        if (da < 0.0) != (db < 0.0) {
+            kept.push(a + (b - a) * (da / (da - db)));
+        }
+    }
+    kept
 }
 
 /// A look view on the middle of a measure view, from the right and above.
@@ -84,90 +218,77 @@ pub(crate) fn look(measure: &MeasureView, radius: f32) -> LookView {
     }
 }
 
-/// Points of the occluder's edges that have a receiver within `radius`, by
-/// brute force: no tree is worth building for so few points.
-fn stands(objects: &[Object], radius: f32) -> Vec<Stand> {
-    let receiver: Vec<Boxed> = objects
-        .iter()
-        .filter(|o| !o.occluder)
-        .flat_map(|o| o.mesh.corners())
-        .map(|c| Boxed { min: c[0].min(c[1]).min(c[2]), max: c[0].max(c[1]).max(c[2]), corners: c })
-        .collect();
-    let points: Vec<Vec3> = objects
+/// Points along the occluder's edges, no further than R/2 apart on edges up to
+/// 32 R long, triangle by triangle.
+fn edge_points(objects: &[Object], radius: f32) -> impl Iterator<Item = Vec3> + '_ {
+    objects
         .iter()
         .filter(|o| o.occluder)
         .flat_map(|o| o.mesh.corners())
         .flat_map(|[a, b, c]| [(a, b), (b, c), (c, a)])
-        .flat_map(|(a, b)| {
+        .flat_map(move |(a, b)| {
             let steps = ((b - a).length() / (0.5 * radius)).ceil().clamp(1.0, 64.0) as u32;
             (0..steps).map(move |i| a + (b - a) * (i as f32 / steps as f32))
         })
+}
+
+/// A sample of the sheet and the nearest point of a receiver found so far.
+struct Sample {
+    point: Vec3,
+    distance2: f32,
+    nearest: Option<(Vec3, [Vec3; 3])>,
+}
+
+/// Points of the occluder's edges that have a receiver within `radius`, in one
+/// pass over the receivers' triangles: each is held against boxes of samples.
+fn stands(objects: &[Object], radius: f32) -> Vec<Stand> {
+    let stride = edge_points(objects, radius).count().div_ceil(SAMPLES).max(1);
+    let mut samples: Vec<Sample> = edge_points(objects, radius)
+        .step_by(stride)
+        .map(|point| Sample { point, distance2: radius * radius, nearest: None })
         .collect();
-    let stride = points.len().div_ceil(SAMPLES).max(1);
-    points.iter().step_by(stride).filter_map(|&p| stand(p, &receiver, radius)).collect()
-}
-
-fn stand(sheet: Vec3, receiver: &[Boxed], radius: f32) -> Option<Stand> {
-    let mut best = radius * radius;
-    let mut found = None;
-    for b in receiver {
-        if (sheet.clamp(b.min, b.max) - sheet).length_squared() > best {
-            continue;
-        }
-        let at = closest_point(sheet, &b.corners);
-        let d = (at - sheet).length_squared();
-        if d < best {
-            best = d;
-            found = Some((at, &b.corners));
+    let mut clusters: Vec<(Vec3, Vec3, &mut [Sample])> = samples
+        .chunks_mut(CLUSTER)
+        .map(|c| {
+            let low = c.iter().map(|s| s.point).fold(Vec3::INFINITY, Vec3::min);
+            (low - radius, c.iter().map(|s| s.point).fold(Vec3::NEG_INFINITY, Vec3::max) + radius, c)
+        })
+        .collect();
+    for corners in objects.iter().filter(|o| !o.occluder).flat_map(|o| o.mesh.corners()) {
+        let [a, b, c] = corners;
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        for (from, to, cluster) in &mut clusters {
+            if low.cmple(*to).all() && high.cmpge(*from).all() {
+                for sample in cluster.iter_mut() {
+                    sample.meet(low, high, &corners);
+                }
+            }
         }
     }
-    let (base, [a, b, c]) = found?;
-    let normal = (*b - *a).cross(*c - *a).normalize_or_zero();
-    let normal = if normal.dot(sheet - base) < 0.0 { -normal } else { normal };
-    let gap = normal.dot(sheet - base);
-    // A sheet that touches leaves no room for a view; one that stands beside the
-    // receiver's rim and not over it is no sheet over a receiver.
-    (gap > 1e-3 * radius && gap > 0.99 * best.sqrt()).then_some(Stand { sheet, base, normal, gap })
+    samples.iter().filter_map(Sample::stand).collect()
 }
 
-/// The direction in the plane across `normal` in which points spread most, by
-/// power iteration on their covariance.
-fn longest_axis(points: impl Iterator<Item = Vec3>, normal: Vec3) -> Vec3 {
-    let covariance = points.fold(Mat3::ZERO, |m, p| {
-        let p = p - normal * normal.dot(p);
-        m + Mat3::from_cols(p * p.x, p * p.y, p * p.z)
-    });
-    let start = normal.any_orthonormal_vector();
-    let mut axis = start + 0.5 * normal.cross(start);
-    for _ in 0..64 {
-        axis = (covariance * axis).try_normalize().unwrap_or(start);
+impl Sample {
+    fn meet(&mut self, low: Vec3, high: Vec3, corners: &[Vec3; 3]) {
+        if (self.point.clamp(low, high) - self.point).length_squared() > self.distance2 {
+            return;
+        }
+        let at = closest_point(self.point, corners);
+        let distance2 = (at - self.point).length_squared();
+        if distance2 < self.distance2 {
+            (self.distance2, self.nearest) = (distance2, Some((at, *corners)));
+        }
     }
-    axis
+
+    /// None beside the receiver's rim: such a point does not stand over it.
+    fn stand(&self) -> Option<Stand> {
+        let (base, [a, b, c]) = self.nearest?;
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let normal = if normal.dot(self.point - base) < 0.0 { -normal } else { normal };
+        let gap = normal.dot(self.point - base);
+        (gap >= 0.99 * self.distance2.sqrt()).then_some(Stand { base, normal, gap })
+    }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::library;
-
-    #[test]
-    fn the_view_under_a_curtain_is_the_one_a_person_would_give() {
-        for name in ["curtain-open", "curtain-room", "thick-box"] {
-            let scene = library::scene(name).unwrap();
-            let found = measure(&scene.objects, scene.ao.radius).unwrap();
-            let given = scene.measure;
-            assert!((found.normal - given.normal).length() < 1e-4, "{name}: {found:?}");
-            assert!((found.transect - given.transect).length() < 1e-3, "{name}: {found:?}");
-            assert!((found.clearance - given.clearance).abs() < 1e-4, "{name}: {found:?}");
-            assert_eq!((found.pixel, found.resolution), (given.pixel, given.resolution));
-            let off = found.center - given.center;
-            assert!(off.x.abs() < 0.11 && off.y.abs() < 1e-5, "{name}: {found:?}");
-        }
-    }
-
-    #[test]
-    fn without_a_sheet_near_a_receiver_there_is_no_view() {
-        let scene = library::scene("plane").unwrap();
-        assert!(measure(&scene.objects, 0.25).unwrap_err().contains("ao.radius"));
-    }
-}
+mod tests;

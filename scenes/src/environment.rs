@@ -1,6 +1,6 @@
 //! The light a scene stands in.
 
-use crate::bounded::{NonNegative, Positive, Triple};
+use crate::bounded::{Radiance, Triple};
 use glam::Vec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -80,7 +80,7 @@ impl Portal {
 #[serde(deny_unknown_fields)]
 pub(crate) struct EnvironmentFile {
     /// Radiance of a uniform sky.
-    radiance: Option<Positive>,
+    radiance: Option<Radiance<1, 1_000_000_000>>,
     /// A sky whose radiance changes with elevation.
     gradient: Option<GradientFile>,
     /// Openings and lamps worth aiming at, for scenes that are mostly closed.
@@ -92,11 +92,11 @@ pub(crate) struct EnvironmentFile {
 #[serde(deny_unknown_fields)]
 struct GradientFile {
     /// Radiance from straight above.
-    zenith: NonNegative,
+    zenith: Radiance<0, 1_000_000_000>,
     /// Radiance from just above the horizon.
-    horizon: NonNegative,
+    horizon: Radiance<0, 1_000_000_000>,
     /// Radiance from below the horizon.
-    ground: NonNegative,
+    ground: Radiance<0, 1_000_000_000>,
 }
 
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
@@ -115,14 +115,14 @@ impl EnvironmentFile {
     pub(crate) fn of(environment: &Environment) -> Self {
         let (radiance, gradient) = match environment.sky {
             Sky::None => (None, None),
-            Sky::Uniform(radiance) => (Some(Positive(radiance)), None),
+            Sky::Uniform(radiance) => (Some(Radiance(radiance)), None),
             Sky::Gradient { zenith, horizon, ground } => {
-                let [zenith, horizon, ground] = [zenith, horizon, ground].map(NonNegative);
+                let [zenith, horizon, ground] = [zenith, horizon, ground].map(Radiance);
                 (None, Some(GradientFile { zenith, horizon, ground }))
             }
         };
         let portal = |p: &Portal| {
-            let [corner, u, v] = [p.corner, p.u, p.v].map(|v| Triple(v.to_array()));
+            let [corner, u, v] = [p.corner, p.u, p.v].map(Triple::from);
             PortalFile { corner, u, v }
         };
         EnvironmentFile { radiance, gradient, portals: environment.portals.iter().map(portal).collect() }

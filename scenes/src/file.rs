@@ -1,8 +1,12 @@
 //! Scene files: TOML in, [`Scene`] out, and errors that say where.
 
+mod resolved;
+
+pub use resolved::Parameters;
+
 use crate::{
     AoScale, Material, Object, Scene,
-    bounded::{Albedo, NonNegative, Positive, check_name},
+    bounded::{Albedo, Fine, Radiance, check_name},
     derive,
     environment::EnvironmentFile,
     generators::Shape,
@@ -83,9 +87,9 @@ pub(crate) struct SceneFile {
 #[serde(deny_unknown_fields)]
 struct AoFile {
     /// R, length of a primary ray, metres.
-    radius: Positive,
+    radius: Fine<1_000, 1_000_000_000>,
     /// R', half length of a secondary ray, metres; R/4 unless given.
-    secondary_radius: Option<Positive>,
+    secondary_radius: Option<Fine<100, 1_000_000_000>>,
 }
 
 /// `[[object]]`: one shape with its material.
@@ -102,7 +106,7 @@ struct ObjectFile {
     /// Linear colour in place of `albedo`: red, green and blue.
     color: Option<[Albedo; 3]>,
     /// Radiance it sends out: red, green and blue.
-    emission: Option<[NonNegative; 3]>,
+    emission: Option<[Radiance<0, 1_000_000_000>; 3]>,
     /// What it looks like.
     shape: Shape,
 }
@@ -125,6 +129,10 @@ impl ObjectFile {
 }
 
 impl SceneFile {
+    fn parse(file: &str, text: &str) -> Result<Self, SceneError> {
+        toml::from_str(text).map_err(|e| SceneError::Toml { file: file.to_owned(), source: Box::new(e) })
+    }
+
     fn build(self, name: &str, folder: Option<&Path>) -> Result<Scene, String> {
         check_name(name).map_err(|e| format!("the scene's name, its file's without the ending: {e}"))?;
         let mut objects = Vec::with_capacity(self.objects.len());
@@ -211,9 +219,9 @@ impl Scene {
     /// # Ok::<(), aogauge_scenes::SceneError>(())
     /// ```
     pub fn from_toml(name: &str, file: &str, text: &str, folder: Option<&Path>) -> Result<Scene, SceneError> {
-        let parsed: SceneFile =
-            toml::from_str(text).map_err(|e| SceneError::Toml { file: file.to_owned(), source: Box::new(e) })?;
-        parsed.build(name, folder).map_err(|message| SceneError::Invalid { file: file.to_owned(), message })
+        SceneFile::parse(file, text)?
+            .build(name, folder)
+            .map_err(|message| SceneError::Invalid { file: file.to_owned(), message })
     }
 
     /// Reads a scene file; its name is the file's, without the ending.
@@ -246,7 +254,7 @@ impl Scene {
         let file = SceneFile {
             description: self.description.clone(),
             control: self.control,
-            ao: AoFile { radius: Positive(self.ao.radius), secondary_radius: Some(Positive(self.ao.secondary_radius)) },
+            ao: AoFile { radius: Fine(self.ao.radius), secondary_radius: Some(Fine(self.ao.secondary_radius)) },
             environment: EnvironmentFile::of(&self.environment),
             measure: None,
             look: None,

@@ -27,10 +27,10 @@ mod view;
 mod view_table;
 mod views_json;
 
-pub use bounded::check_name;
+pub use bounded::{Count, check_name};
 pub use camera::{Camera, Projection};
 pub use environment::{Environment, Portal, Sky};
-pub use file::SceneError;
+pub use file::{Parameters, SceneError};
 pub use light::{Light, LightKind};
 pub use material::{MAX_ALBEDO, Material, luminance};
 pub use mesh::{Mesh, MeshError, closest_point};

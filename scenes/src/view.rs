@@ -1,6 +1,6 @@
 //! Where a scene is measured from, and where its pictures are taken.
 
-use crate::bounded::{Positive, Triple};
+use crate::bounded::{Angle, Count, Direction, Fine, Triple};
 use glam::Vec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -130,22 +130,14 @@ impl LookView {
     }
 }
 
-/// Width and height in pixels, each 16 to 4096.
-#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
-#[serde(transparent)]
-pub(crate) struct Resolution(pub [u32; 2]);
+/// Width and height in pixels.
+pub(crate) type Resolution = [Count<16, 4096>; 2];
 
-impl<'de> Deserialize<'de> for Resolution {
-    fn deserialize<D: serde::Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-        let [w, h] = <[u32; 2]>::deserialize(d)?;
-        if [w, h].iter().any(|v| !(16..=4096).contains(v)) {
-            return Err(serde::de::Error::custom(format!(
-                "a resolution of {w} x {h} is out of range: 16 to 4096 pixels each way"
-            )));
-        }
-        Ok(Self([w, h]))
-    }
-}
+/// A length of a view: from a micrometre to a kilometre.
+pub(crate) type Extent = Fine<1, 1_000_000_000>;
+
+/// Vertical field of view, degrees.
+pub(crate) type FieldOfView = Angle<1, 169>;
 
 /// `[measure]` of a scene file.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
@@ -154,13 +146,13 @@ pub(crate) struct MeasureFile {
     /// The point of the receiver at the centre of the image, metres.
     pub center: Triple,
     /// Normal of the receiver, towards the occluder.
-    pub normal: Triple,
+    pub normal: Direction,
     /// Direction across the occluder, along the receiver.
-    pub transect: Triple,
+    pub transect: Direction,
     /// Height of the near plane over the receiver, metres: under the occluder.
-    pub clearance: Positive,
+    pub clearance: Extent,
     /// Edge of a pixel, metres; R/50 unless given, and no larger.
-    pub pixel: Option<Positive>,
+    pub pixel: Option<Extent>,
     /// Width and height in pixels.
     pub resolution: Resolution,
 }
@@ -189,19 +181,20 @@ impl MeasureFile {
             transect,
             clearance: self.clearance.0,
             pixel,
-            resolution: self.resolution.0,
+            resolution: self.resolution.map(|n| n.0),
         })
     }
+}
 
-    /// A view in numbers.
-    pub(crate) fn of(view: &MeasureView) -> Self {
+impl From<&MeasureView> for MeasureFile {
+    fn from(view: &MeasureView) -> Self {
         MeasureFile {
-            center: Triple(view.center.to_array()),
-            normal: Triple(view.normal.to_array()),
-            transect: Triple(view.transect.to_array()),
-            clearance: Positive(view.clearance),
-            pixel: Some(Positive(view.pixel)),
-            resolution: Resolution(view.resolution),
+            center: view.center.into(),
+            normal: view.normal.into(),
+            transect: view.transect.into(),
+            clearance: Fine(view.clearance),
+            pixel: Some(Fine(view.pixel)),
+            resolution: view.resolution.map(Count),
         }
     }
 }
@@ -215,22 +208,12 @@ pub(crate) struct LookFile {
     /// The point at the centre of the image, metres.
     pub target: Triple,
     /// Vertical field of view, degrees; 45 unless given.
-    pub fov: Option<Positive>,
+    pub fov: Option<FieldOfView>,
     /// Width and height in pixels.
     pub resolution: Resolution,
 }
 
 impl LookFile {
-    /// A view in numbers.
-    pub(crate) fn of(view: &LookView) -> Self {
-        LookFile {
-            eye: Triple(view.eye.to_array()),
-            target: Triple(view.target.to_array()),
-            fov: Some(Positive(view.fov)),
-            resolution: Resolution(view.resolution),
-        }
-    }
-
     pub(crate) fn build(&self) -> Result<LookView, String> {
         let (eye, target) = (self.eye.vec(), self.target.vec());
         let forward = unit(target - eye, "look.target - look.eye")?;
@@ -238,10 +221,18 @@ impl LookFile {
             return Err("look: the camera must not look straight up or down".into());
         }
         let fov = self.fov.map_or(45.0, |f| f.0);
-        if fov >= 170.0 {
-            return Err(format!("look.fov is {fov}: it must be below 170 degrees"));
+        Ok(LookView { eye, target, fov, resolution: self.resolution.map(|n| n.0) })
+    }
+}
+
+impl From<&LookView> for LookFile {
+    fn from(view: &LookView) -> Self {
+        LookFile {
+            eye: view.eye.into(),
+            target: view.target.into(),
+            fov: Some(Angle(view.fov)),
+            resolution: view.resolution.map(Count),
         }
-        Ok(LookView { eye, target, fov, resolution: self.resolution.0 })
     }
 }
 

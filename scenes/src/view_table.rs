@@ -3,8 +3,8 @@
 
 use crate::{
     Camera, LookView, MeasureView,
-    bounded::{Positive, Triple},
-    view::{LookFile, MeasureFile, Resolution},
+    bounded::{Direction, Triple},
+    view::{Extent, FieldOfView, LookFile, MeasureFile, Resolution},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
@@ -28,7 +28,7 @@ pub(crate) struct MeasureCamera {
     camera: String,
     /// Distance from the near plane to the receiver, metres; half the way to the
     /// far plane unless given.
-    clearance: Option<Positive>,
+    clearance: Option<Extent>,
     /// Width and height in pixels, as wide to high as the camera sees.
     resolution: Resolution,
 }
@@ -53,13 +53,25 @@ pub(crate) struct LookCamera {
     resolution: Resolution,
 }
 
+impl From<&MeasureView> for MeasureTable {
+    fn from(view: &MeasureView) -> Self {
+        MeasureTable::Numbers(view.into())
+    }
+}
+
+impl From<&LookView> for LookTable {
+    fn from(view: &LookView) -> Self {
+        LookTable::Numbers(view.into())
+    }
+}
+
 impl MeasureTable {
     pub(crate) fn build(&self, cameras: &[Camera], radius: f32) -> Result<MeasureView, String> {
         match self {
             MeasureTable::Numbers(numbers) => numbers.build(radius),
             MeasureTable::Camera(c) => {
                 let view = named(cameras, &c.camera)
-                    .and_then(|found| found.measure_view(c.resolution.0, c.clearance.map(|v| v.0)))
+                    .and_then(|found| found.measure_view(c.resolution.map(|n| n.0), c.clearance.map(|v| v.0)))
                     .map_err(|e| format!("measure.camera is '{}', but {e}", c.camera))?;
                 view.fine_enough(radius)?;
                 Ok(view)
@@ -73,7 +85,7 @@ impl LookTable {
         match self {
             LookTable::Numbers(numbers) => numbers.build(),
             LookTable::Camera(c) => named(cameras, &c.camera)
-                .and_then(|found| found.look_view(c.resolution.0))
+                .and_then(|found| found.look_view(c.resolution.map(|n| n.0)))
                 .map_err(|e| format!("look.camera is '{}', but {e}", c.camera)),
         }
     }
@@ -96,10 +108,10 @@ fn named<'a>(cameras: &'a [Camera], name: &str) -> Result<&'a Camera, String> {
 struct AnyMeasure {
     camera: Option<String>,
     center: Option<Triple>,
-    normal: Option<Triple>,
-    transect: Option<Triple>,
-    clearance: Option<Positive>,
-    pixel: Option<Positive>,
+    normal: Option<Direction>,
+    transect: Option<Direction>,
+    clearance: Option<Extent>,
+    pixel: Option<Extent>,
     resolution: Resolution,
 }
 
@@ -116,7 +128,7 @@ impl<'de> Deserialize<'de> for MeasureTable {
                 resolution,
             }));
         };
-        if center.or(normal).or(transect).is_some() || pixel.is_some() {
+        if center.is_some() || normal.or(transect).is_some() || pixel.is_some() {
             return Err(D::Error::custom("give a camera, or center, normal, transect and pixel, not both"));
         }
         Ok(MeasureTable::Camera(MeasureCamera { camera, clearance, resolution }))
@@ -130,7 +142,7 @@ struct AnyLook {
     camera: Option<String>,
     eye: Option<Triple>,
     target: Option<Triple>,
-    fov: Option<Positive>,
+    fov: Option<FieldOfView>,
     resolution: Resolution,
 }
 

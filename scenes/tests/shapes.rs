@@ -6,10 +6,11 @@
 
 mod legal;
 
-use aogauge_scenes::Mesh;
+use aogauge_scenes::{Mesh, Scene};
 use glam::Vec3;
-use legal::{FAMILIES, Kind, legal, parameters, shape};
+use legal::{FAMILIES, Kind, Parameter, legal, parameters, shape};
 use proptest::{prelude::*, test_runner::TestRunner};
+use serde_json::Value;
 use std::{cell::Cell, collections::HashMap};
 
 /// Panics unless the mesh is sound: valid, without degenerate triangles, and each
@@ -99,18 +100,30 @@ fn every_legal_parameter_set_gives_a_sound_mesh() {
             Ok(())
         });
         assert!(result.is_ok(), "{family}: {}", result.unwrap_err());
-        assert!(made.get() >= 40, "{family}: {} made, {} refused", made.get(), refused.get());
+        // Of two corners of a block drawn at random, one in eight is above the other.
+        let least = if family == "block" { 15 } else { 40 };
+        assert!(made.get() >= least, "{family}: {} made, {} refused", made.get(), refused.get());
     }
+}
+
+/// A little under the lowest, and over the highest.
+fn beyond(min: f64, max: f64) -> [String; 2] {
+    [format!("{:?}", min - 0.01), format!("{:?}", max + 1.0)]
 }
 
 #[test]
 fn every_value_out_of_range_is_refused_by_name_and_range() {
-    for (family, declared) in FAMILIES {
-        for p in parameters(declared) {
+    // An atrium takes too long for the tests that make every shape many times.
+    for (family, declared) in FAMILIES.into_iter().chain([("atrium", "Atrium")]) {
+        let all = parameters(declared);
+        for p in &all {
+            let others: String = all.iter().filter(|o| o.name != p.name).map(Parameter::line).collect();
+            let refused = |value: &str| shape(family, &format!("{others}{} = {value}", p.name)).unwrap_err();
             let (bad, bounds) = match &p.kind {
-                Kind::Number { zero, min, max } => {
-                    let below = if *zero { -1.0 } else { min - 0.01 };
-                    (vec![format!("{below:?}"), format!("{:?}", max + 1.0)], vec![min.to_string(), max.to_string()])
+                Kind::Number { min, max, .. } => (beyond(*min, *max).to_vec(), vec![format!("from {min} to {max}")]),
+                Kind::Vector { min, max } => {
+                    let each = |v: String| [format!("[{v}, 1, 1]"), format!("[1, {v}, 1]"), format!("[1, 1, {v}]")];
+                    (beyond(*min, *max).into_iter().flat_map(each).collect(), vec![format!("from {min} to {max} m")])
                 }
                 Kind::Count { min, max } => {
                     (vec![(*min as i64 - 1).to_string(), (max + 1).to_string()], vec![min.to_string(), max.to_string()])
@@ -121,7 +134,7 @@ fn every_value_out_of_range_is_refused_by_name_and_range() {
                 }
             };
             for value in bad {
-                let message = shape(family, &format!("{} = {value}", p.name)).unwrap_err();
+                let message = refused(&value);
                 for part in bounds.iter().chain([&p.name]) {
                     assert!(
                         message.contains(part.as_str()),
@@ -131,7 +144,7 @@ fn every_value_out_of_range_is_refused_by_name_and_range() {
                 }
             }
             if let Kind::Number { .. } = p.kind {
-                let message = shape(family, &format!("{} = nan", p.name)).unwrap_err();
+                let message = refused("nan");
                 assert!(message.contains("finite") && message.contains(&p.name), "{message}");
             }
         }
@@ -141,12 +154,75 @@ fn every_value_out_of_range_is_refused_by_name_and_range() {
 
 #[test]
 fn every_family_has_defaults_that_work() {
-    for (family, _) in FAMILIES {
+    for (family, _) in FAMILIES.into_iter().filter(|(_, t)| parameters(t).iter().all(|p| !p.required)) {
         let objects = shape(family, "").unwrap_or_else(|e| panic!("{family}: {e}"));
         for o in &objects {
             check(&o.mesh, family);
         }
     }
+}
+
+/// `[ao]` and the other tables of a scene file: what is out of range is refused
+/// by name and range.
+#[test]
+fn every_number_of_a_scene_file_keeps_to_its_range() {
+    let text = "description = 'x'\nao = { radius = 1, secondary_radius = 1 }\n\
+         environment = { gradient = { zenith = 1, horizon = 1, ground = 1 } }\n\
+         measure = { center = [1, 1, 1], normal = [0, 1, 0], transect = [1, 0, 0], clearance = 1, pixel = 0.01, resolution = [16, 16] }\n\
+         look = { eye = [2, 2, 2], target = [1, 1, 1], fov = 45, resolution = [16, 16] }\n\
+         [[object]]\nname = 'it'\nalbedo = 0.5\nemission = [1, 1, 1]\nshape = { ridge = {} }\n";
+    let read = |text: &str| Scene::from_toml("x", "x.toml", text, None);
+    assert!(read(text).is_ok(), "{}", read(text).unwrap_err());
+    for (field, min, max, unit) in [
+        ("radius = 1,", 0.001, 1000.0, " m"),
+        ("secondary_radius = 1 ", 0.0001, 1000.0, " m"),
+        ("zenith = 1", 0.0, 1e6, ""),
+        ("ground = 1", 0.0, 1e6, ""),
+        ("center = [1", -1e5, 1e5, " m"),
+        ("transect = [1", -1000.0, 1000.0, ""),
+        ("clearance = 1", 1e-6, 1000.0, " m"),
+        ("pixel = 0.01", 1e-6, 1000.0, " m"),
+        ("eye = [2", -1e5, 1e5, " m"),
+        ("fov = 45", 1.0, 169.0, " degrees"),
+        ("emission = [1", 0.0, 1e6, ""),
+    ] {
+        let (name, value) = field.split_at(field.find(|c: char| c.is_ascii_digit()).unwrap());
+        let rest = value.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
+        for bad in beyond(min, max) {
+            let message = read(&text.replacen(field, &format!("{name}{bad}{rest}"), 1)).unwrap_err().to_string();
+            let range = format!("it must be from {min} to {max}{unit}");
+            assert!(message.contains(&range) && message.contains(name), "{field}: {message}");
+        }
+    }
+    for (from, to, range) in [
+        ("albedo = 0.5", "albedo = 1", "from 0 up to, but not including, 1"),
+        ("resolution = [16", "resolution = [8", "a whole number from 16 to 4096"),
+    ] {
+        let message = read(&text.replace(from, to)).unwrap_err().to_string();
+        assert!(message.contains(range), "{message}");
+    }
+}
+
+/// No number of the published schema is without bounds, but indices into a list.
+#[test]
+fn every_number_of_the_schema_has_bounds() {
+    fn walk(of: &Value, path: &str, free: &mut Vec<String>) {
+        if of["type"] == "number" || of["type"] == "integer" {
+            let bounds = if of["anyOf"].is_array() { &of["anyOf"][1] } else { of };
+            let above = bounds["maximum"].is_number() || bounds["exclusiveMaximum"].is_number();
+            if !(above && bounds["minimum"].is_number()) {
+                free.push(path.to_owned());
+            }
+        }
+        match of {
+            Value::Object(fields) => fields.iter().for_each(|(k, v)| walk(v, &format!("{path}/{k}"), free)),
+            Value::Array(items) => items.iter().enumerate().for_each(|(i, v)| walk(v, &format!("{path}/{i}"), free)),
+            _ => {}
+        }
+    }
+    let mut free = Vec::new();
+    walk(&serde_json::to_value(Scene::file_schema()).unwrap(), "", &mut free);
+    assert_eq!(free, ["/$defs/Polygons/properties/triangles/items/items"]);
 }
 
 #[test]

@@ -93,7 +93,7 @@ macro_rules! usage {
         }
     )*};
 }
-usage!(DiskError, crate::kit::KitError, ReportError, SceneError, SuiteError);
+usage!(DiskError, crate::kit::KitError, crate::preview::PreviewError, ReportError, SceneError, SuiteError);
 
 impl From<RunError> for Failure {
     fn from(e: RunError) -> Self {

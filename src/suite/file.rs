@@ -4,46 +4,16 @@ use super::EstimatorFile;
 use crate::{
     gate::{Gate, Limit},
     metrics::{MetricName, regions::Region},
+    scenes::Count,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
-macro_rules! counted {
-    ($(#[$doc:meta])* $name:ident, $lo:literal ..= $hi:literal) => {
-        $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
-        #[serde(transparent)]
-        pub struct $name(#[schemars(range(min = $lo, max = $hi))] u32);
+/// Rays or paths a pixel.
+pub type Rays = Count<1, 65536>;
 
-        impl $name {
-            /// The number.
-            pub fn get(self) -> u32 {
-                self.0
-            }
-        }
-
-        impl<'de> Deserialize<'de> for $name {
-            fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-                let value = i64::deserialize(d)?;
-                match u32::try_from(value) {
-                    Ok(v) if ($lo..=$hi).contains(&v) => Ok(Self(v)),
-                    _ => Err(D::Error::custom(format!(
-                        "{value} is out of range: it must be from {} to {}", $lo, $hi
-                    ))),
-                }
-            }
-        }
-    };
-}
-
-counted!(
-    /// Rays or paths a pixel.
-    Rays, 1..=65536
-);
-counted!(
-    /// Independent renders.
-    Replicates, 2..=1024
-);
+/// Independent renders.
+pub type Replicates = Count<2, 1024>;
 
 /// A suite file: what to render and what must hold.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -86,7 +56,7 @@ fn one() -> u32 {
 }
 
 fn look_rays() -> Rays {
-    Rays(64)
+    Count(64)
 }
 
 /// `[judge]`: the path tracer goes on until each region mean is precise.
@@ -107,7 +77,7 @@ pub struct JudgeSettings {
 
 impl Default for JudgeSettings {
     fn default() -> Self {
-        JudgeSettings { precision: 0.02, paths: Rays(16), replicates: Replicates(16), max_replicates: Replicates(128) }
+        JudgeSettings { precision: 0.02, paths: Count(16), replicates: Count(16), max_replicates: Count(128) }
     }
 }
 

@@ -1,6 +1,6 @@
 //! A covered walk beside an open courtyard: light comes from one side.
 
-use crate::{Mesh, bounded::Positive};
+use crate::{Mesh, bounded::Length};
 use glam::Vec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -12,15 +12,15 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Arcade {
     /// From the opening to the back wall of the walk, metres.
-    pub depth: Positive,
+    pub depth: Length<100, 100_000>,
     /// From the floor to the ceiling of the walk, metres.
-    pub height: Positive,
+    pub height: Length<100, 100_000>,
     /// From the opening to the opposite wall of the courtyard, metres.
-    pub courtyard: Positive,
+    pub courtyard: Length<100, 100_000>,
     /// How far the walls round the courtyard rise above the ceiling of the walk, metres.
-    pub storey: Positive,
+    pub storey: Length<100, 100_000>,
     /// Extent along z, centred on z = 0, metres; closed by walls at both ends.
-    pub length: Positive,
+    pub length: Length<100, 100_000>,
 }
 
 impl Arcade {
@@ -56,11 +56,11 @@ mod tests {
     #[test]
     fn every_wall_faces_into_the_air() {
         let mesh = Arcade {
-            depth: Positive(2.0),
-            height: Positive(3.0),
-            courtyard: Positive(4.0),
-            storey: Positive(2.0),
-            length: Positive(6.0),
+            depth: Length(2.0),
+            height: Length(3.0),
+            courtyard: Length(4.0),
+            storey: Length(2.0),
+            length: Length(6.0),
         }
         .mesh();
         // A point of the opening sees the front of every face but the facade,

@@ -18,7 +18,7 @@ impl Block {
     pub(crate) fn mesh(&self) -> Result<Mesh, String> {
         let (min, max) = (self.min.vec(), self.max.vec());
         if !max.cmpgt(min).all() {
-            return Err("block: max must be above min on every axis".into());
+            return Err(format!("block: max is {max} and min is {min}: max must be above min on every axis"));
         }
         let mut mesh = Mesh::default();
         mesh.push_box(min, max);

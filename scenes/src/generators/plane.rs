@@ -1,6 +1,7 @@
 //! A rectangle: open ground, a wall.
 
 use crate::{Mesh, bounded::Triple};
+use glam::Vec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -19,11 +20,13 @@ pub struct Plane {
 impl Plane {
     pub(crate) fn mesh(&self) -> Result<Mesh, String> {
         let (u, v) = (self.u.vec(), self.v.vec());
-        if u.cross(v).length() <= 0.0 {
-            return Err("plane: u and v must not be parallel or zero".into());
-        }
         let mut mesh = Mesh::default();
         mesh.push_quad(self.center.vec() - u / 2.0 - v / 2.0, u, v);
+        // Of the corners as rounded: far from the origin small edges vanish.
+        let area = |[a, b, c]: [Vec3; 3]| (b.as_dvec3() - a.as_dvec3()).cross(c.as_dvec3() - a.as_dvec3()).length();
+        if mesh.corners().any(|t| area(t) <= 0.0) {
+            return Err("plane: u and v must span an area at center: not parallel, and not too short for 32-bit coordinates there".into());
+        }
         Ok(mesh)
     }
 }

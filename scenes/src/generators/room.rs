@@ -1,6 +1,6 @@
 //! A closed room with one window: light comes from one side, and is scarce.
 
-use crate::{Mesh, bounded::Positive};
+use crate::{Mesh, bounded::Length};
 use glam::Vec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -11,11 +11,11 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Room {
     /// Extent along x, metres.
-    pub width: Positive,
+    pub width: Length<100, 100_000>,
     /// Extent along y, metres.
-    pub height: Positive,
+    pub height: Length<100, 100_000>,
     /// Extent along z, metres.
-    pub depth: Positive,
+    pub depth: Length<100, 100_000>,
     /// The window.
     pub window: Window,
 }
@@ -25,11 +25,11 @@ pub struct Room {
 #[serde(deny_unknown_fields)]
 pub struct Window {
     /// From the floor to its lower edge, metres.
-    pub sill: Positive,
+    pub sill: Length<10, 100_000>,
     /// From its lower to its upper edge, metres.
-    pub height: Positive,
+    pub height: Length<10, 100_000>,
     /// Extent along z, metres.
-    pub width: Positive,
+    pub width: Length<10, 100_000>,
 }
 
 impl Room {
@@ -39,7 +39,8 @@ impl Room {
         let side = self.window.width.0 / 2.0;
         if high >= y || side >= z {
             return Err(format!(
-                "room: the window (up to {high} m, {} m wide) must leave wall around it (room: {y} m high, {} m deep)",
+                "room: the window must leave wall around it: window.sill + window.height is {high} m, it must be below height {y} m; \
+                 window.width is {} m, it must be below depth {} m",
                 2.0 * side,
                 2.0 * z
             ));
@@ -70,10 +71,10 @@ mod tests {
     #[test]
     fn the_shell_has_the_area_of_a_box_less_the_window() {
         let room = Room {
-            width: Positive(6.0),
-            height: Positive(3.0),
-            depth: Positive(4.0),
-            window: Window { sill: Positive(1.0), height: Positive(1.0), width: Positive(1.5) },
+            width: Length(6.0),
+            height: Length(3.0),
+            depth: Length(4.0),
+            window: Window { sill: Length(1.0), height: Length(1.0), width: Length(1.5) },
         };
         let mesh = room.mesh().unwrap();
         let centre = Vec3::new(0.0, 1.5, 0.0);
@@ -90,10 +91,10 @@ mod tests {
     #[test]
     fn a_window_larger_than_its_wall_is_refused() {
         let room = Room {
-            width: Positive(6.0),
-            height: Positive(1.9),
-            depth: Positive(4.0),
-            window: Window { sill: Positive(1.0), height: Positive(1.0), width: Positive(1.5) },
+            width: Length(6.0),
+            height: Length(1.9),
+            depth: Length(4.0),
+            window: Window { sill: Length(1.0), height: Length(1.0), width: Length(1.5) },
         };
         assert!(room.mesh().unwrap_err().contains("window"));
     }

@@ -1,7 +1,7 @@
 //! `[gltf]` of a scene file.
 
 use super::Imported;
-use crate::bounded::Positive;
+use crate::bounded::Fine;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -17,13 +17,18 @@ pub(crate) struct GltfTable {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     occluders: Vec<String>,
     /// Metres per unit of the model; 1 unless given.
-    scale: Option<Positive>,
+    scale: Option<Fine<1, 1_000_000_000>>,
 }
 
 impl GltfTable {
     /// A model whose occluders are marked in itself.
     pub(crate) fn of(file: &str) -> Self {
         GltfTable { file: file.to_owned(), occluders: Vec::new(), scale: None }
+    }
+
+    /// Says what was left to defaults.
+    pub(crate) fn fill(&mut self) {
+        self.scale.get_or_insert(Fine(1.0));
     }
 
     /// Reads the model.

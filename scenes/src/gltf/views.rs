@@ -22,12 +22,12 @@ pub(crate) const CAMERAS: [&str; 2] = ["measure", "look"];
 
 /// The extras of the camera `measure`.
 pub(super) fn of_measure(view: &MeasureView) -> Value {
-    json!({ "aogauge": { "measure": MeasureFile::of(view) } })
+    json!({ "aogauge": { "measure": MeasureFile::from(view) } })
 }
 
 /// The extras of the camera `look`.
 pub(super) fn of_look(view: &LookView) -> Value {
-    json!({ "aogauge": { "look": LookFile::of(view) } })
+    json!({ "aogauge": { "look": LookFile::from(view) } })
 }
 
 /// Takes the views out of a camera's extras, where it has any.

@@ -8,7 +8,11 @@ use proptest::prelude::*;
 use serde_json::Value;
 
 /// The families, with the type that declares their parameters.
-pub const FAMILIES: [(&str, &str); 12] = [
+pub const FAMILIES: [(&str, &str); 16] = [
+    ("plane", "Plane"),
+    ("block", "Block"),
+    ("arcade", "Arcade"),
+    ("room", "Room"),
     ("curtain", "Curtain"),
     ("banner", "Banner"),
     ("slatted-fence", "SlattedFence"),
@@ -53,12 +57,37 @@ pub fn shape(family: &str, parameters: &str) -> Result<Vec<Object>, String> {
 pub struct Parameter {
     pub name: String,
     pub kind: Kind,
+    /// Whether it has no default.
+    pub required: bool,
+}
+
+impl Parameter {
+    /// A line that gives it a legal value, where it must be given.
+    pub fn line(&self) -> String {
+        match &self.kind {
+            _ if !self.required => String::new(),
+            Kind::Vector { .. } => format!("{} = [1, 2, 3]\n", self.name),
+            _ => format!("{} = 1\n", self.name),
+        }
+    }
 }
 
 #[derive(Clone, Debug)]
 pub enum Kind {
-    Number { zero: bool, min: f64, max: f64 },
-    Count { min: u64, max: u64 },
+    Number {
+        zero: bool,
+        min: f64,
+        max: f64,
+    },
+    Count {
+        min: u64,
+        max: u64,
+    },
+    /// Three numbers.
+    Vector {
+        min: f64,
+        max: f64,
+    },
     Choice(Vec<String>),
 }
 
@@ -71,12 +100,15 @@ pub fn parameters(family: &str) -> Vec<Parameter> {
 }
 
 fn collect(schema: &Value, of: &Value, prefix: &str, found: &mut Vec<Parameter>) {
-    for (name, declared) in of["properties"].as_object().unwrap() {
-        let name = format!("{prefix}{name}");
+    for (key, declared) in of["properties"].as_object().unwrap() {
+        let required = of["required"].as_array().is_some_and(|r| r.iter().any(|n| n == key));
+        let name = format!("{prefix}{key}");
         let target = |v: &Value| v["$ref"].as_str().map(|r| schema.pointer(r.trim_start_matches('#')).unwrap().clone());
         let optional = declared["anyOf"].get(0).and_then(target);
         let declared = target(declared).or(optional).unwrap_or_else(|| declared.clone());
-        let bound = |key: &str| declared[key].as_f64().or(declared["anyOf"][1][key].as_f64());
+        let vector = declared["type"] == "array";
+        let number = if vector { &declared["items"] } else { &declared };
+        let bound = |key: &str| number[key].as_f64().or(number["anyOf"][1][key].as_f64());
         let kind = if declared["properties"].is_object() {
             collect(schema, &declared, &format!("{name}."), found);
             continue;
@@ -91,31 +123,42 @@ fn collect(schema: &Value, of: &Value, prefix: &str, found: &mut Vec<Parameter>)
                 panic!("{name} has no bounds: {declared}");
             };
             match declared["type"].as_str() {
+                Some("array") => Kind::Vector { min, max },
                 Some("integer") => Kind::Count { min: min as u64, max: max as u64 },
                 _ => Kind::Number { zero: declared["anyOf"].is_array(), min, max },
             }
         };
-        found.push(Parameter { name, kind });
+        found.push(Parameter { name, kind, required });
     }
 }
 
-/// Values of a parameter: its ends, its default (none), and all between, small
-/// ones as often as large ones.
-fn values(kind: &Kind) -> BoxedStrategy<Option<String>> {
+/// A number between bounds: their ends, and all between, small ones as often as
+/// large ones.
+fn number(low: f64, min: f64, max: f64) -> BoxedStrategy<String> {
+    let scaled = (0.0..1.0f64).prop_map(move |u| min + (max - min) * u.powi(6));
+    let signed = (-1.0..1.0f64).prop_map(move |u| (max.max(-min) * u.powi(7)).clamp(min, max));
+    let scaled = if min < 0.0 { signed.boxed() } else { scaled.boxed() };
+    prop_oneof![10 => scaled, 2 => min..=max, 1 => Just(low), 1 => Just(min), 1 => Just(max)]
+        .prop_map(|v| format!("{v:.6}"))
+        .boxed()
+}
+
+/// Values of a parameter, and its default (none) where it has one.
+fn values(kind: &Kind, required: bool) -> BoxedStrategy<Option<String>> {
     let any = match kind.clone() {
         Kind::Choice(choices) => prop::sample::select(choices).boxed(),
         // What is capped high is drawn low most of the time, to keep the test quick.
         Kind::Count { min, max } => {
             prop_oneof![8 => min..=max.min(min + 40), 1 => min..=max.min(2000)].prop_map(|n| n.to_string()).boxed()
         }
-        Kind::Number { zero, min, max } => {
-            let scaled = (0.0..1.0f64).prop_map(move |u| min + (max - min) * u.powi(6));
-            let low = if zero { 0.0 } else { min };
-            prop_oneof![10 => scaled, 2 => min..=max, 1 => Just(low), 1 => Just(min), 1 => Just(max)]
-                .prop_map(|v| format!("{v:.6}"))
-                .boxed()
+        Kind::Number { zero, min, max } => number(if zero { 0.0 } else { min }, min, max),
+        Kind::Vector { min, max } => {
+            [(); 3].map(|()| number(min, min, max)).prop_map(|[x, y, z]| format!("[{x}, {y}, {z}]")).boxed()
         }
     };
+    if required {
+        return any.prop_map(Some).boxed();
+    }
     prop_oneof![any.prop_map(Some), Just(None)].boxed()
 }
 
@@ -124,7 +167,7 @@ pub fn legal(parameters: &[Parameter]) -> impl Strategy<Value = String> + use<> 
         .iter()
         .map(|p| {
             let name = p.name.clone();
-            values(&p.kind).prop_map(move |v| v.map(|v| format!("{name} = {v}\n")).unwrap_or_default())
+            values(&p.kind, p.required).prop_map(move |v| v.map(|v| format!("{name} = {v}\n")).unwrap_or_default())
         })
         .collect();
     all.prop_map(|lines| lines.concat())

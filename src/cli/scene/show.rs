@@ -3,14 +3,13 @@
 use super::{load, source};
 use crate::{
     cli::{Exit, Failure, Format, json, print, tell},
-    render::{Estimator, Geometry, Job, Renderer, cpu::Cpu},
-    report::picture,
-    scenes::{LookView, MeasureView, Scene},
+    preview,
+    scenes::{Material, Mesh, Parameters, Scene, Sky, luminance},
 };
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Show what is in a scene: objects, bounds, views, and a preview.
+/// Show what is in a scene: all parameters, its objects, and a preview.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  aogauge scene show curtain-arcade --preview arcade.png\n  aogauge scene show my-scene.toml"
@@ -18,10 +17,10 @@ use std::path::PathBuf;
 pub struct Args {
     /// A built-in scene by name, or a scene file.
     scene: String,
-    /// Write a picture from the look view here: classic openness, PNG.
+    /// Write a picture from the look view here: path-traced, in colour, PNG.
     #[arg(long)]
     preview: Option<PathBuf>,
-    /// Primary rays a pixel of the preview.
+    /// Paths a pixel of the preview; four at least.
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=65536))]
     rays: u32,
     /// How it is printed.
@@ -35,33 +34,10 @@ struct Shown {
     description: String,
     control: bool,
     hash: String,
-    triangles: usize,
-    bounds: [[f32; 3]; 2],
-    radius: f32,
-    secondary_radius: f32,
-    measure: Measure,
-    look: Look,
+    /// The scene file, with all defaults filled in.
+    parameters: Parameters,
     objects: Vec<Shape>,
-    /// The scene file's text.
-    parameters: String,
-}
-
-#[derive(Serialize)]
-struct Measure {
-    center: [f32; 3],
-    normal: [f32; 3],
-    transect: [f32; 3],
-    clearance: f32,
-    pixel: f32,
-    resolution: [u32; 2],
-}
-
-#[derive(Serialize)]
-struct Look {
-    eye: [f32; 3],
-    target: [f32; 3],
-    fov: f32,
-    resolution: [u32; 2],
+    totals: Totals,
 }
 
 #[derive(Serialize)]
@@ -70,99 +46,158 @@ struct Shape {
     occluder: bool,
     triangles: usize,
     bounds: [[f32; 3]; 2],
+    material: Surface,
 }
 
-fn shown(scene: &Scene, parameters: String) -> Shown {
-    let objects: Vec<Shape> = scene
-        .objects
-        .iter()
-        .map(|o| Shape {
-            name: o.name.clone(),
-            occluder: o.occluder,
-            triangles: o.mesh.triangles.len(),
-            bounds: o.mesh.bounds().unwrap_or_default().map(|v| v.to_array()),
-        })
-        .collect();
-    let corner = |side: usize, pick: fn(f32, f32) -> f32| {
-        std::array::from_fn(|axis| objects.iter().map(|o| o.bounds[side][axis]).reduce(pick).unwrap_or(0.0))
+#[derive(Serialize)]
+struct Surface {
+    base_color: [f32; 3],
+    textured: bool,
+    metallic: f32,
+    roughness: f32,
+    emissive: [f32; 3],
+}
+
+#[derive(Serialize)]
+struct Totals {
+    objects: usize,
+    triangles: usize,
+    occluders: usize,
+    occluder_triangles: usize,
+    bounds: [[f32; 3]; 2],
+    /// The light, in words.
+    environment: String,
+    /// Names of the cameras that a model brought along.
+    cameras: Vec<String>,
+}
+
+fn bounds(mesh: &Mesh) -> [[f32; 3]; 2] {
+    mesh.bounds().unwrap_or_default().map(|v| v.to_array())
+}
+
+fn shapes(scene: &Scene) -> Vec<Shape> {
+    let surface = |m: &Material| Surface {
+        base_color: m.base_color,
+        textured: m.texture.is_some(),
+        metallic: m.metallic,
+        roughness: m.roughness,
+        emissive: m.emissive,
     };
-    let MeasureView { center, normal, transect, clearance, pixel, resolution } = scene.measure;
-    let LookView { eye, target, fov, resolution: look } = scene.look;
-    Shown {
-        name: scene.name.clone(),
-        description: scene.description.clone(),
-        control: scene.control,
-        hash: scene.hash(),
-        triangles: objects.iter().map(|o| o.triangles).sum(),
+    let shape = |o: &crate::scenes::Object| Shape {
+        name: o.name.clone(),
+        occluder: o.occluder,
+        triangles: o.mesh.triangles.len(),
+        bounds: bounds(&o.mesh),
+        material: surface(&o.material),
+    };
+    scene.objects.iter().map(shape).collect()
+}
+
+fn totals(scene: &Scene, shapes: &[Shape]) -> Totals {
+    let corner = |side: usize, pick: fn(f32, f32) -> f32| {
+        std::array::from_fn(|axis| shapes.iter().map(|o| o.bounds[side][axis]).reduce(pick).unwrap_or(0.0))
+    };
+    let occluders = || shapes.iter().filter(|s| s.occluder);
+    Totals {
+        objects: shapes.len(),
+        triangles: shapes.iter().map(|s| s.triangles).sum(),
+        occluders: occluders().count(),
+        occluder_triangles: occluders().map(|s| s.triangles).sum(),
         bounds: [corner(0, f32::min), corner(1, f32::max)],
-        radius: scene.ao.radius,
-        secondary_radius: scene.ao.secondary_radius,
-        measure: Measure {
-            center: center.to_array(),
-            normal: normal.to_array(),
-            transect: transect.to_array(),
-            clearance,
-            pixel,
-            resolution,
-        },
-        look: Look { eye: eye.to_array(), target: target.to_array(), fov, resolution: look },
-        objects,
-        parameters,
+        environment: environment(scene),
+        cameras: scene.cameras.iter().map(|c| c.name.clone()).collect(),
+    }
+}
+
+fn environment(scene: &Scene) -> String {
+    let sky = match scene.environment.sky {
+        Sky::None => "no sky".to_owned(),
+        Sky::Uniform(radiance) => format!("uniform sky of radiance {radiance}"),
+        Sky::Gradient { zenith, horizon, ground } => {
+            format!("sky of radiance {zenith} at the zenith, {horizon} at the horizon, {ground} below")
+        }
+    };
+    let lamps = scene.objects.iter().filter(|o| luminance(o.material.emissive) > 0.0).count();
+    let counted = |n: usize, what: &str| match n {
+        0 => String::new(),
+        1 => format!(", 1 {what}"),
+        n => format!(", {n} {what}s"),
+    };
+    let portals = counted(scene.environment.portals.len(), "portal");
+    sky + &portals + &counted(lamps, "lamp") + &counted(scene.lights.len(), "punctual light")
+}
+
+/// Three numbers, to a tenth of a millimetre.
+fn point(p: [f32; 3]) -> String {
+    let number = |v: f32| (f64::from(v) * 1e4).round() / 1e4 + 0.0;
+    format!("[{}, {}, {}]", number(p[0]), number(p[1]), number(p[2]))
+}
+
+impl Surface {
+    fn text(&self) -> String {
+        let [r, g, b] = self.base_color;
+        let mut text = if r == g && g == b { format!("albedo {r}") } else { format!("color {:?}", self.base_color) };
+        if self.textured {
+            text += ", textured";
+        }
+        if self.metallic > 0.0 {
+            text += &format!(", metallic {}", self.metallic);
+        }
+        if self.emissive != [0.0; 3] {
+            text += &format!(", emission {:?}", self.emissive);
+        }
+        text
     }
 }
 
 impl Shown {
     fn text(&self) -> String {
-        let [lo, hi] = self.bounds;
-        let (m, l) = (&self.measure, &self.look);
+        let control = if self.control { " (control)" } else { "" };
         let mut text = format!(
-            "{}{}\n{}\n\nhash       {}\ntriangles  {}\nbounds     {lo:?} to {hi:?} m\nR, R'      {} m, {} m\n\
-             measure    {} x {} pixels of {} m at {:?}, normal {:?}, transect {:?}, clearance {} m\n\
-             look       {} x {} pixels from {:?} to {:?}, {} degrees\n\n",
+            "{}{control}\n{}\n\n# Parameters, with defaults filled in\n\n{}\n# Objects\n\n",
             self.name,
-            if self.control { " (control)" } else { "" },
             self.description,
-            self.hash,
-            self.triangles,
-            self.radius,
-            self.secondary_radius,
-            m.resolution[0],
-            m.resolution[1],
-            m.pixel,
-            m.center,
-            m.normal,
-            m.transect,
-            m.clearance,
-            l.resolution[0],
-            l.resolution[1],
-            l.eye,
-            l.target,
-            l.fov,
+            self.parameters.toml()
         );
-        for o in &self.objects {
+        let width = self.objects.iter().map(|o| o.name.len()).max().unwrap_or(0).max(8);
+        let rows = self.objects.iter().map(|o| {
+            let [lo, hi] = o.bounds.map(point);
             let mark = if o.occluder { "occluder" } else { "" };
-            text += &format!("  {:<28} {:>9} triangles  {mark}\n", o.name, o.triangles);
+            let (name, triangles) = (&o.name, o.triangles);
+            format!("{name:<width$}  {triangles:>9} triangles  {mark:<8}  {lo} to {hi} m  {}\n", o.material.text())
+        });
+        text.extend(rows);
+        let t = &self.totals;
+        let [lo, hi] = t.bounds.map(point);
+        text += &format!(
+            "\n# Totals\n\ntriangles    {} in {} objects\noccluders    {}, {} triangles\nbounds       {lo} to {hi} m\nenvironment  {}\n",
+            t.triangles, t.objects, t.occluders, t.occluder_triangles, t.environment
+        );
+        if !t.cameras.is_empty() {
+            text += &format!("cameras      {}\n", t.cameras.join(", "));
         }
-        text += &format!("\n{}", self.parameters);
-        text
+        text + &format!("hash         {}\n", self.hash)
     }
 }
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
     let scene = load(&args.scene)?;
-    let shown = shown(&scene, source(&args.scene)?);
+    let objects = shapes(&scene);
+    let shown = Shown {
+        name: scene.name.clone(),
+        description: scene.description.clone(),
+        control: scene.control,
+        hash: scene.hash(),
+        parameters: Parameters::new(&scene, &args.scene, &source(&args.scene)?)?,
+        totals: totals(&scene, &objects),
+        objects,
+    };
     print(&match args.format {
         Format::Json => json(&shown)?,
         Format::Text => shown.text(),
     })?;
     if let Some(path) = &args.preview {
-        let fail = |e: crate::render::RenderError| Failure::usage(format!("scene '{}': {e}", scene.name));
-        let geometry = Geometry::new(&scene).map_err(fail)?;
-        let view = scene.look.view();
-        let rays = args.rays;
-        let job = Job { view: &view, estimator: Estimator::CLASSIC, ao: scene.ao, rays, seed: 1, replicate: 0 };
-        let frame = Cpu.load(&geometry).and_then(|mut loaded| loaded.render(&job)).map_err(fail)?;
-        picture::openness(&frame.values, frame.resolution, 1, path)?;
+        preview::write(&scene, args.rays, path)?;
         tell(&path.display().to_string());
     }
     Ok(Exit::Pass)

@@ -18,15 +18,12 @@ mod vaults;
 use super::Part;
 use crate::{
     Material,
-    bounded::{Count, Length, NonNegative},
+    bounded::{Count, Length, Thickness},
 };
 use plan::{Plan, STOREYS};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sink::Sink;
-
-/// Thinnest and thickest cloth that is no single sheet, metres.
-const CLOTH: [f32; 2] = [0.001, 0.02];
 
 /// Two storeys of arcades round an open courtyard, with pleated curtains in the
 /// lower arches and banners before the upper ones. Curtains and banners are
@@ -42,8 +39,8 @@ pub struct Atrium {
     /// From the crest of a pleat to its trough, at the hem, metres; 0.12 unless given.
     pub pleat_depth: Length<0, 300>,
     /// Thickness of curtains and banners, metres; 0, a single sheet, unless
-    /// given, else 0.001 to 0.02.
-    pub cloth_thickness: NonNegative,
+    /// given.
+    pub cloth_thickness: Thickness<1_000, 20_000>,
     /// Arches along each long side of the courtyard; 7 unless given.
     pub bays_long: Count<5, 10>,
     /// Arches along each short side of the courtyard; 3 unless given.
@@ -56,7 +53,7 @@ impl Default for Atrium {
             triangles: Count(250_000),
             hem_gap: Length(0.03),
             pleat_depth: Length(0.12),
-            cloth_thickness: NonNegative(0.0),
+            cloth_thickness: Thickness(0.0),
             bays_long: Count(7),
             bays_short: Count(3),
         }
@@ -95,13 +92,6 @@ fn dye(number: u32) -> (&'static str, [f32; 3]) {
 
 impl Atrium {
     pub(crate) fn parts(&self) -> Result<Vec<Part>, String> {
-        let thickness = self.cloth_thickness.0;
-        if thickness != 0.0 && !(CLOTH[0]..=CLOTH[1]).contains(&thickness) {
-            let [thin, thick] = CLOTH;
-            return Err(format!(
-                "atrium: cloth_thickness is {thickness} m: it must be 0, for a single sheet, or from {thin} to {thick} m"
-            ));
-        }
         let mut parts = vec![];
         self.make(&self.fit()?, |name, color, occluder, make| {
             let mut sink = Sink::new(true);
