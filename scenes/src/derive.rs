@@ -18,6 +18,8 @@ const MAX_GROUPS: usize = 64;
 
 /// A point of the sheet with the receiver under it.
 struct Stand {
+    /// Which object of the scene the sheet is.
+    sheet: usize,
     base: Vec3,
     normal: Vec3,
     gap: f32,
@@ -36,9 +38,9 @@ impl Stand {
 }
 
 /// A measure view under the part of the occluder that comes nearest to a
-/// receiver, a floor where there is one: centred below its edge, the transect across it, the near plane at
-/// 0.8 of the least height of the occluder within 2.5 R, 2 R to each side at
-/// R/50 a pixel.
+/// receiver, a floor where there is one: centred below its edge, of many sheets
+/// below that of one, the transect across it, the near plane at 0.8 of the least
+/// height of the occluder within 2.5 R, 2 R to each side at R/50 a pixel.
 ///
 /// The transect runs across the long direction of the edge. Under a base that
 /// is about as wide as long there is none; then it is the first of the axes x, y
@@ -75,7 +77,11 @@ pub(crate) fn measure(objects: &[Object], radius: f32) -> Result<MeasureView, St
 /// least height there where that is too low.
 fn under(objects: &[Object], group: &[&Stand], normal: Vec3, radius: f32) -> Result<MeasureView, (Vec3, f32)> {
     let lowest = group.iter().map(|s| s.gap).fold(f32::INFINITY, f32::min);
-    let edge: Vec<Vec3> = group.iter().filter(|s| s.gap <= lowest + 0.1 * radius).map(|s| s.base).collect();
+    let low: Vec<&Stand> = group.iter().copied().filter(|s| s.gap <= lowest + 0.1 * radius).collect();
+    // Of many curtains one: under all of them together there is no long direction.
+    let of = |sheet: usize| low.iter().filter(|s| s.sheet == sheet).count();
+    let sheet = low.iter().map(|s| s.sheet).max_by_key(|&sheet| (of(sheet), std::cmp::Reverse(sheet)));
+    let edge: Vec<Vec3> = low.iter().filter(|s| Some(s.sheet) == sheet).map(|s| s.base).collect();
     let mean = edge.iter().sum::<Vec3>() / edge.len() as f32;
     let center = edge.iter().copied().min_by(|a, b| a.distance(mean).total_cmp(&b.distance(mean))).unwrap_or(mean);
     let transect = transect(&edge, mean, normal);
@@ -220,20 +226,29 @@ pub(crate) fn look(measure: &MeasureView, radius: f32) -> LookView {
 
 /// Points along the occluder's edges, no further than R/2 apart on edges up to
 /// 32 R long, triangle by triangle.
-fn edge_points(objects: &[Object], radius: f32) -> impl Iterator<Item = Vec3> + '_ {
+fn edge_points(objects: &[Object], radius: f32) -> impl Iterator<Item = (usize, Vec3)> + '_ {
     objects
         .iter()
-        .filter(|o| o.occluder)
-        .flat_map(|o| o.mesh.corners())
-        .flat_map(|[a, b, c]| [(a, b), (b, c), (c, a)])
-        .flat_map(move |(a, b)| {
+        .enumerate()
+        .filter(|(_, o)| o.occluder)
+        .flat_map(|(sheet, o)| o.mesh.corners().map(move |corners| (sheet, corners)))
+        .flat_map(|(sheet, [a, b, c])| [(a, b), (b, c), (c, a)].map(|edge| (sheet, edge)))
+        .flat_map(move |(sheet, (a, b))| {
             let steps = ((b - a).length() / (0.5 * radius)).ceil().clamp(1.0, 64.0) as u32;
-            (0..steps).map(move |i| a + (b - a) * (i as f32 / steps as f32))
+            (0..steps).map(move |i| (sheet, a + (b - a) * (i as f32 / steps as f32)))
         })
+}
+
+/// A place in a stretch of `stride`, another for each stretch: with equal steps
+/// through the triangles of a grid, the hem might never be met.
+fn somewhere(stretch: usize, stride: usize) -> usize {
+    let mixed = (stretch as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    ((mixed >> 32) % stride as u64) as usize
 }
 
 /// A sample of the sheet and the nearest point of a receiver found so far.
 struct Sample {
+    sheet: usize,
     point: Vec3,
     distance2: f32,
     nearest: Option<(Vec3, [Vec3; 3])>,
@@ -244,8 +259,9 @@ struct Sample {
 fn stands(objects: &[Object], radius: f32) -> Vec<Stand> {
     let stride = edge_points(objects, radius).count().div_ceil(SAMPLES).max(1);
     let mut samples: Vec<Sample> = edge_points(objects, radius)
-        .step_by(stride)
-        .map(|point| Sample { point, distance2: radius * radius, nearest: None })
+        .enumerate()
+        .filter(|(i, _)| i % stride == somewhere(i / stride, stride))
+        .map(|(_, (sheet, point))| Sample { sheet, point, distance2: radius * radius, nearest: None })
         .collect();
     let mut clusters: Vec<(Vec3, Vec3, &mut [Sample])> = samples
         .chunks_mut(CLUSTER)
@@ -286,7 +302,7 @@ impl Sample {
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let normal = if normal.dot(self.point - base) < 0.0 { -normal } else { normal };
         let gap = normal.dot(self.point - base);
-        (gap >= 0.99 * self.distance2.sqrt()).then_some(Stand { base, normal, gap })
+        (gap >= 0.99 * self.distance2.sqrt()).then_some(Stand { sheet: self.sheet, base, normal, gap })
     }
 }
 

@@ -169,7 +169,11 @@ fn a_camera_that_has_been_moved_since_counts_itself() {
 fn a_view_in_extras_is_checked_like_any_input() {
     let scene = library::scene("curtain-open").unwrap();
     for (path, value, wanted) in [
-        ("/measure/resolution", serde_json::json!([4_000_000_000_u32, 32]), "16 to 4096 pixels"),
+        (
+            "/measure/resolution",
+            serde_json::json!([4_000_000_000_u32, 32]),
+            "resolution[0]: 4000000000 is out of range: it must be a whole number from 16 to 4096",
+        ),
         ("/measure/clearance", serde_json::json!(-1), "out of range"),
         ("/measure/normal", serde_json::json!([0, 0, 0]), "zero vector"),
         ("/measure/pixel", serde_json::json!(null), "pixel is missing"),

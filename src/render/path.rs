@@ -279,7 +279,7 @@ look = {{ eye = [1, 1, 1], target = [0, 0, 0], resolution = [16, 16] }}
         let mut g = lit(
             "[[object]]\nname = 'floor'\nalbedo = 0\nshape = { plane = { center = [0, 0, 0], u = [0, 0, 40], v = [40, 0, 0] } }\n\
              [[object]]\nname = 'block'\nalbedo = 0\nshape = { block = { min = [1.9, 0.5, -0.2], max = [2.1, 0.6, 0.2] } }",
-            "{ radiance = 1e-9 }",
+            "{ gradient = { zenith = 0, horizon = 0, ground = 1 } }",
         );
         g.lights = Lights::of_punctual(vec![aogauge_scenes::Light {
             name: "lamp".into(),

@@ -107,3 +107,19 @@ fn what_hangs_under_the_receiver_does_not_count() {
     let view = found(0.25, &format!("{}, {below}", occluder("curtain = { gap = 0.1 }"))).unwrap();
     assert!(view.normal.y > 0.999 && (view.clearance - 0.08).abs() < 1e-5, "{view:?}");
 }
+
+/// The atrium's curtains hang between columns, many at a time; the view is found
+/// on its floor all the same, under one of them, at every size of its meshes.
+#[test]
+fn under_many_curtains_the_view_is_under_one_of_them() {
+    let text = library::SCENES.iter().find(|(name, _)| *name == "atrium").unwrap().1;
+    for triangles in [20_000, 250_000] {
+        let text = text.replace("triangles = 250000", &format!("triangles = {triangles}"));
+        let scene = Scene::from_toml("atrium", "atrium.toml", &text, None).unwrap();
+        let found = measure(&scene.objects, scene.ao.radius).unwrap();
+        assert!(found.normal.y > 0.99 && found.center.y.abs() < 0.02, "{found:?}");
+        let across = found.transect.abs().to_array();
+        assert!(across[0].max(across[2]) > 0.999, "curtains hang along an axis: {found:?}");
+        assert!(found.clearance > 0.01 && found.clearance < 0.2, "{found:?}");
+    }
+}

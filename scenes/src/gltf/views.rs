@@ -54,16 +54,24 @@ pub(super) fn read(def: &CameraDef, index: usize, camera: &Camera, out: &mut Imp
 }
 
 fn measure(table: &Value, camera: &Camera) -> Result<MeasureView, String> {
-    let exact = MeasureFile::deserialize(table).map_err(|e| e.to_string())?.exact()?;
+    let exact = parsed::<MeasureFile>(table)?.exact()?;
     let now = camera.measure_view(exact.resolution, None)?;
     let same = alike(&exact.view(), &now.view()) && (exact.clearance - now.clearance).abs() <= 1e-3 * exact.clearance;
     Ok(if same { exact } else { now })
 }
 
 fn look(table: &Value, camera: &Camera) -> Result<LookView, String> {
-    let exact = LookFile::deserialize(table).map_err(|e| e.to_string())?.build()?;
+    let exact = parsed::<LookFile>(table)?.build()?;
     let now = camera.look_view(exact.resolution)?;
     Ok(if alike(&exact.view(), &now.view()) { exact } else { now })
+}
+
+/// A table; the message names the field.
+fn parsed<'de, T: Deserialize<'de>>(table: &'de Value) -> Result<T, String> {
+    serde_path_to_error::deserialize(table).map_err(|e| match e.path().iter().next() {
+        Some(_) => format!("{}: {}", e.path(), e.inner()),
+        None => e.into_inner().to_string(),
+    })
 }
 
 /// Whether two views show the same but for rounding.
