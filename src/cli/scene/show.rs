@@ -154,9 +154,8 @@ impl Shown {
     fn text(&self) -> String {
         let control = if self.control { " (control)" } else { "" };
         let mut text = format!(
-            "{}{control}\n{}\n\n# Parameters, with defaults filled in\n\n{}\n# Objects\n\n",
+            "{}{control}\n\n# Parameters, with defaults filled in\n\n{}\n# Objects\n\n",
             self.name,
-            self.description,
             self.parameters.toml()
         );
         let width = self.objects.iter().map(|o| o.name.len()).max().unwrap_or(0).max(8);
