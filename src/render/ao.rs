@@ -1,6 +1,5 @@
 //! Openness, ray by ray: `classic`, `obscurance`, `extended`,
-//! `extended-obscurance`. Twin, for `classic` and the paper's `extended`:
-//! `gpu/shaders/ao.wgsl`.
+//! `extended-obscurance`. Twin: `gpu/shaders/ao.wgsl`.
 
 use super::{
     Extension, Faces, Falloff, Openness, ReceiverPlane, SecondaryOrigin, Sides,
@@ -36,12 +35,18 @@ pub struct Decided {
 }
 
 impl Decided {
-    /// What the ray counts, in [0, 1]: mu (1 - closed / secondary rays).
-    pub fn weight(self) -> f32 {
+    /// mu times the open secondary rays, or mu where there are none: summed in
+    /// these units, openness without falloff is exact.
+    pub fn units(self) -> f32 {
         match self.secondary_rays {
             0 => self.mu,
-            n => self.mu * ((n - self.closed.count_ones()) as f32 / n as f32),
+            n => self.mu * (n - self.closed.count_ones()) as f32,
         }
+    }
+
+    /// What the ray counts, in [0, 1]: mu (1 - closed / secondary rays).
+    pub fn weight(self) -> f32 {
+        self.units() / self.secondary_rays.max(1) as f32
     }
 }
 
@@ -151,16 +156,14 @@ impl<'a> Shading<'a> {
         for i in 0..rays {
             let shift = if chance { sampler.pair(i, 1) } else { [0.0; 2] };
             let decided = self.decide(sampler.pair(i, 0), shift);
-            sum += f64::from(decided.weight());
+            sum += f64::from(decided.units());
             if i < 32 {
                 decisions.primary |= u32::from(decided.hit) << i;
                 decisions.first |= (decided.closed & 1) << i;
                 decisions.second |= (decided.closed >> 1 & 1) << i;
             }
         }
-        let mean = sum / f64::from(rays);
-        let intensity = self.method.intensity;
-        (if intensity == 1.0 { mean as f32 } else { mean.powf(f64::from(intensity)) as f32 }, decisions)
+        (self.method.mean(sum, rays), decisions)
     }
 }
 

@@ -228,6 +228,13 @@ impl Openness {
             scale: Scale { radius: None, secondary_radius: None },
         }
     }
+
+    /// Openness from a sum over `rays` of [`Decided::units`](super::ao::Decided::units).
+    pub fn mean(&self, sum: f64, rays: u32) -> f32 {
+        let units = self.extension.map_or(1, |e| e.secondary_rays);
+        let mean = sum / (f64::from(rays) * f64::from(units));
+        if self.intensity == 1.0 { mean as f32 } else { mean.powf(f64::from(self.intensity)) as f32 }
+    }
 }
 
 impl Estimator {
@@ -256,11 +263,9 @@ impl Estimator {
         }
     }
 
-    /// The plane of the receiver in the two methods that the GPU computes, None
-    /// within for classic; None for all others.
-    pub fn of_the_gpu(&self) -> Option<Option<ReceiverPlane>> {
-        let planes = [None, Some(ReceiverPlane::Counts), Some(ReceiverPlane::Clipped)];
-        planes.into_iter().find(|plane| *self == plane.map_or(Estimator::CLASSIC, Estimator::extended))
+    /// Whether the GPU computes it.
+    pub fn is_on_gpu(&self) -> bool {
+        matches!(self, Estimator::Openness(_))
     }
 }
 
@@ -299,14 +304,13 @@ mod tests {
     }
 
     #[test]
-    fn the_gpu_knows_three_methods() {
-        assert_eq!(Estimator::CLASSIC.of_the_gpu(), Some(None));
-        for plane in [ReceiverPlane::Counts, ReceiverPlane::Clipped] {
-            assert_eq!(Estimator::extended(plane).of_the_gpu(), Some(Some(plane)));
-        }
-        assert_eq!(Estimator::PathTraced.of_the_gpu(), None);
+    fn methods_know_their_names() {
+        assert_eq!(Estimator::CLASSIC.kind(), Kind::Classic);
+        assert_eq!(Estimator::extended(ReceiverPlane::Counts).kind(), Kind::Extended);
         let obscurance = Openness::plain(Falloff::Exponential { extinction: 1.0 });
-        assert_eq!(Estimator::Openness(obscurance).of_the_gpu(), None);
         assert_eq!(Estimator::Openness(obscurance).kind(), Kind::Obscurance);
+        let extension = Some(Extension::of_the_paper(ReceiverPlane::Counts));
+        let both = Estimator::Openness(Openness { extension, ..obscurance });
+        assert_eq!(both.kind(), Kind::ExtendedObscurance);
     }
 }

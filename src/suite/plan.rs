@@ -59,7 +59,7 @@ impl<'a> Plan<'a> {
                     continue;
                 }
                 for method in &suite.methods {
-                    if renderer == "gpu" && method.estimator.of_the_gpu().is_none() {
+                    if renderer == "gpu" && !method.estimator.is_on_gpu() {
                         continue;
                     }
                     for rays in method.rays.as_ref().map_or(suite.file.rays.as_slice(), std::slice::from_ref) {

@@ -1,7 +1,10 @@
 //! A scene on the GPU, and the dispatches that render it.
 
 use super::Gpu;
-use crate::render::{Frame, Geometry, Job, Loaded, ReceiverPlane, RenderError, ao::Decisions};
+use crate::render::{
+    Estimator, Faces, Falloff, Frame, Geometry, Job, Loaded, Openness, ReceiverPlane, RenderError, SecondaryOrigin,
+    Sides, ao::Decisions,
+};
 use aogauge_scenes::View;
 use bytemuck::{Pod, Zeroable};
 use std::time::{Duration, Instant};
@@ -20,7 +23,7 @@ const RAYS_HARDWARE: u64 = 1 << 23;
 const RAYS_AN_INVOCATION: u32 = 32;
 
 /// What the shader writes where its loops were stopped early.
-const STOPPED: u32 = u32::MAX;
+const STOPPED: f32 = -1.0;
 
 /// Threads of a workgroup, as the shader says.
 const WORKGROUP: u32 = 64;
@@ -45,11 +48,16 @@ struct Params {
     direction_dy: [f32; 3],
     seed: u32,
     replicate: u32,
-    estimator: u32,
     radius: f32,
     secondary_radius: f32,
     offset: f32,
-    unused: [u32; 3],
+    reach: f32,
+    falloff: u32,
+    unused: [u32; 2],
+    falloff_numbers: [f32; 3],
+    options: u32,
+    secondary_rays: u32,
+    unused_too: [u32; 3],
 }
 
 /// `Surface` of ao.wgsl.
@@ -66,7 +74,7 @@ struct Surface {
 struct Images {
     pixels: u64,
     surfaces: wgpu::Buffer,
-    halves: wgpu::Buffer,
+    sums: wgpu::Buffer,
     decisions: wgpu::Buffer,
     bind_group: wgpu::BindGroup,
 }
@@ -126,9 +134,9 @@ impl<'a> LoadedGpu<'a> {
             }))
         };
         let surfaces = buffer("surfaces", size_of::<Surface>())?;
-        let halves = buffer("halves", size_of::<u32>())?;
+        let sums = buffer("sums", size_of::<f32>())?;
         let decisions = buffer("decisions", size_of::<Decisions>())?;
-        let buffers = [&self.params, &self.nodes, &self.triangles, &surfaces, &halves, &decisions];
+        let buffers = [&self.params, &self.nodes, &self.triangles, &surfaces, &sums, &decisions];
         let entries: Vec<wgpu::BindGroupEntry<'_>> = (0u32..)
             .zip(buffers)
             .map(|(binding, b)| wgpu::BindGroupEntry { binding, resource: b.as_entire_binding() })
@@ -138,19 +146,19 @@ impl<'a> LoadedGpu<'a> {
             layout: &self.gpu.layout,
             entries: &entries,
         });
-        Ok(Images { pixels, surfaces, halves, decisions, bind_group })
+        Ok(Images { pixels, surfaces, sums, decisions, bind_group })
     }
 
     /// Sees, then shades, in pieces that are each a submission of their own. The
     /// timer counts shading, as the CPU's clock does.
-    fn dispatch(&self, job: &Job<'_>, images: &Images, timer: Option<&Timer>) {
+    fn dispatch(&self, job: &Job<'_>, method: &Openness, images: &Images, timer: Option<&Timer>) {
         let pixels = images.pixels as u32;
         for (px, rays) in pieces(pixels, 1, self.budget()) {
-            self.submit(&self.gpu.see, self.params(job, px, rays), images, None);
+            self.submit(&self.gpu.see, self.params(job, method, px, rays), images, None);
         }
         for (slot, (px, rays)) in (0..).zip(pieces(pixels, job.rays, self.budget())) {
-            let params = self.params(job, px, rays);
-            self.submit(&self.gpu.open_halves, params, images, timer.map(|t| (t, slot)));
+            let params = self.params(job, method, px, rays);
+            self.submit(&self.gpu.openness, params, images, timer.map(|t| (t, slot)));
         }
     }
 
@@ -158,7 +166,16 @@ impl<'a> LoadedGpu<'a> {
         if self.gpu.is_software() { RAYS_SOFTWARE } else { RAYS_HARDWARE }
     }
 
-    fn params(&self, job: &Job<'_>, pixels: std::ops::Range<u32>, rays: std::ops::Range<u32>) -> Params {
+    fn params(
+        &self,
+        job: &Job<'_>,
+        method: &Openness,
+        pixels: std::ops::Range<u32>,
+        rays: std::ops::Range<u32>,
+    ) -> Params {
+        let ao = method.scale.on(job.ao);
+        let (falloff, falloff_numbers) = numbers(method.falloff);
+        let options = options(method);
         let View { resolution, origin, origin_dx, origin_dy, direction, direction_dx, direction_dy } = *job.view;
         Params {
             origin: origin.to_array(),
@@ -174,16 +191,16 @@ impl<'a> LoadedGpu<'a> {
             direction_dy: direction_dy.to_array(),
             seed: job.seed,
             replicate: job.replicate,
-            // What is not known here was refused before.
-            estimator: match job.estimator.of_the_gpu() {
-                Some(Some(ReceiverPlane::Counts)) => 1,
-                Some(Some(ReceiverPlane::Clipped)) => 2,
-                _ => 0,
-            },
-            radius: job.ao.radius,
-            secondary_radius: job.ao.secondary_radius,
+            radius: ao.radius,
+            secondary_radius: ao.secondary_radius,
             offset: self.geometry.tracer.offset(),
-            unused: [0; 3],
+            reach: method.falloff.reach(ao.radius),
+            falloff,
+            unused: [0; 2],
+            falloff_numbers,
+            options,
+            secondary_rays: method.extension.map_or(0, |e| e.secondary_rays),
+            unused_too: [0; 3],
         }
     }
 
@@ -276,13 +293,9 @@ impl Timer {
 
 impl Loaded for LoadedGpu<'_> {
     fn render(&mut self, job: &Job<'_>) -> Result<Frame, RenderError> {
-        if job.estimator.of_the_gpu().is_none() {
-            return Err(RenderError::Unsupported {
-                renderer: "gpu",
-                kind: job.estimator.kind(),
-                knows: "'classic' and the paper's 'extended'",
-            });
-        }
+        let Estimator::Openness(method) = &job.estimator else {
+            return Err(RenderError::Unsupported { renderer: "gpu", kind: job.estimator.kind(), knows: "openness" });
+        };
         let pixels = job.view.pixels() as u64;
         let images = match self.images.take() {
             Some(images) if images.pixels == pixels => images,
@@ -292,10 +305,10 @@ impl Loaded for LoadedGpu<'_> {
         let frame = guarded(self.gpu, || {
             let dispatches = pieces(pixels as u32, job.rays, self.budget()).len() as u64;
             let timer = self.gpu.tick.map(|_| Timer::new(self.gpu, dispatches));
-            self.dispatch(job, &images, timer.as_ref());
-            let halves: Vec<u32> = self.read(&images.halves)?;
+            self.dispatch(job, method, &images, timer.as_ref());
+            let sums: Vec<f32> = self.read(&images.sums)?;
             let wall = start.elapsed().as_secs_f64();
-            if halves.contains(&STOPPED) {
+            if sums.contains(&STOPPED) {
                 return Err(RenderError::Device(
                     "the driver stopped a loop of the shader early: the scene is too deep for it".into(),
                 ));
@@ -313,16 +326,14 @@ impl Loaded for LoadedGpu<'_> {
             let source = self.geometry.tracer.source();
             Ok(Frame {
                 resolution: job.view.resolution,
-                values: halves
+                values: sums
                     .iter()
                     .zip(&surfaces)
-                    .map(|(&h, s)| {
-                        if s.triangle == u32::MAX {
-                            f32::NAN
-                        } else {
-                            (f64::from(h) / 2.0 / f64::from(job.rays)) as f32
-                        }
-                    })
+                    .map(
+                        |(&sum, s)| {
+                            if s.triangle == u32::MAX { f32::NAN } else { method.mean(f64::from(sum), job.rays) }
+                        },
+                    )
                     .collect(),
                 colors: None,
                 decisions: Some(decisions),
@@ -333,6 +344,27 @@ impl Loaded for LoadedGpu<'_> {
         self.images = Some(images);
         frame
     }
+}
+
+/// A falloff as the shader takes it.
+fn numbers(falloff: Falloff) -> (u32, [f32; 3]) {
+    match falloff {
+        Falloff::Step => (0, [0.0; 3]),
+        Falloff::Exponential { extinction } => (1, [extinction, 0.0, 0.0]),
+        Falloff::LinearTail { tail } => (2, [tail, 0.0, 0.0]),
+        Falloff::Gaussian { lambda, floor, reflectance } => (3, [lambda, floor, reflectance]),
+    }
+}
+
+/// Options as the shader takes them, a bit each.
+fn options(method: &Openness) -> u32 {
+    let of_extension = method.extension.map_or(0, |e| {
+        u32::from(e.receiver_plane == ReceiverPlane::Clipped) << 1
+            | u32::from(e.sides == Sides::One) << 2
+            | u32::from(e.origin == SecondaryOrigin::Jittered) << 3
+            | u32::from(e.is_turned()) << 4
+    });
+    u32::from(method.faces == Faces::Front) | of_extension
 }
 
 /// A range of pixels and a range of rays.

@@ -18,7 +18,7 @@ pub struct Gpu {
     queue: wgpu::Queue,
     layout: wgpu::BindGroupLayout,
     see: wgpu::ComputePipeline,
-    open_halves: wgpu::ComputePipeline,
+    openness: wgpu::ComputePipeline,
     /// Nanoseconds a tick, where the device has timestamp queries.
     tick: Option<f32>,
     /// What went wrong outside an error scope: a lost device, a driver's refusal.
@@ -114,12 +114,12 @@ impl Gpu {
                 cache: None,
             })
         };
-        let (see, open_halves) = (pipeline("see"), pipeline("open_halves"));
+        let (see, openness) = (pipeline("see"), pipeline("openness"));
         if let Some(e) = pollster::block_on(scope.pop()) {
             return Err(RenderError::Device(e.to_string()));
         }
         let tick = (!timestamps.is_empty()).then(|| queue.get_timestamp_period());
-        Ok(Gpu { info: adapter.get_info(), device, queue, layout, see, open_halves, tick, trouble })
+        Ok(Gpu { info: adapter.get_info(), device, queue, layout, see, openness, tick, trouble })
     }
 
     /// Adapter, driver and backend, for people.

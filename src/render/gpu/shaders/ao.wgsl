@@ -17,11 +17,33 @@ struct Params {
     direction_dy: vec3<f32>,
     seed: u32,
     replicate: u32,
-    // 0 classic, 1 extended where the plane counts, 2 extended and clipped.
-    estimator: u32,
     radius: f32,
     secondary_radius: f32,
     offset: f32,
+    // How far a primary ray looks.
+    reach: f32,
+    // STEP, EXPONENTIAL, LINEAR_TAIL or GAUSSIAN, with its numbers in order.
+    falloff: u32,
+    falloff_numbers: vec3<f32>,
+    // FRONT, CLIPPED, ONE_SIDED, JITTERED, TURNED.
+    options: u32,
+    // 0 for methods without.
+    secondary_rays: u32,
+}
+
+const STEP = 0u;
+const EXPONENTIAL = 1u;
+const LINEAR_TAIL = 2u;
+const GAUSSIAN = 3u;
+
+const FRONT = 1u;
+const CLIPPED = 2u;
+const ONE_SIDED = 4u;
+const JITTERED = 8u;
+const TURNED = 16u;
+
+fn is_set(option: u32) -> bool {
+    return (params.options & option) != 0u;
 }
 
 struct Surface {
@@ -39,10 +61,10 @@ struct Decisions {
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(3) var<storage, read_write> surfaces: array<Surface>;
-@group(0) @binding(4) var<storage, read_write> halves: array<u32>;
+@group(0) @binding(4) var<storage, read_write> sums: array<f32>;
 @group(0) @binding(5) var<storage, read_write> decisions: array<Decisions>;
 
-const STOPPED = 0xffffffffu;
+const STOPPED = -1.0;
 
 @compute @workgroup_size(64)
 fn see(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -54,7 +76,7 @@ fn see(@builtin(global_invocation_id) id: vec3<u32>) {
     let y = f32(pixel / params.width) + 0.5;
     let origin = params.origin + params.origin_dx * x + params.origin_dy * y;
     let direction = normalize(params.direction + params.direction_dx * x + params.direction_dy * y);
-    let hit = walk(new_ray(origin, direction, FAR_AWAY), false);
+    let hit = walk(new_ray(origin, direction, FAR_AWAY), false, false);
     var surface = Surface(vec3<f32>(), MISS, vec3<f32>(), 0u);
     if hit.triangle != MISS {
         let a = corner(hit.triangle, 0u);
@@ -66,7 +88,7 @@ fn see(@builtin(global_invocation_id) id: vec3<u32>) {
         surface.triangle = hit.triangle;
     }
     surfaces[pixel] = surface;
-    halves[pixel] = 0u;
+    sums[pixel] = 0.0;
     decisions[pixel] = Decisions(0u, 0u, 0u);
 }
 
@@ -80,35 +102,95 @@ fn tangents(n: vec3<f32>) -> array<vec3<f32>, 2> {
     );
 }
 
-// Bits: 1 primary closed, 2 first secondary closed, 4 second secondary closed.
-fn decide(origin: vec3<f32>, normal: vec3<f32>, t: vec3<f32>, b: vec3<f32>, point: vec2<f32>) -> u32 {
-    let phi = turn(point.y);
-    let sin_theta = sqrt(point.x);
-    let cos_theta = sqrt(1.0 - point.x);
+// mu of a hit at distance d.
+fn mu(d: f32) -> f32 {
+    let n = params.falloff_numbers;
+    switch params.falloff {
+        case EXPONENTIAL: { return 1.0 - exp(-n.x * d); }
+        case LINEAR_TAIL: { return clamp(1.0 - (1.0 - d / params.radius) / n.x, 0.0, 1.0); }
+        case GAUSSIAN: {
+            let x = d / params.radius;
+            let open = 1.0 - (1.0 - n.y) * exp(-n.x * x * x);
+            return open / (1.0 - n.z * (1.0 - open));
+        }
+        default: { return 0.0; }
+    }
+}
+
+struct Primary {
+    hit: bool,
+    mu: f32,
+    // How much of R the ray has before its hit.
+    length: f32,
+}
+
+fn primary(origin: vec3<f32>, w: vec3<f32>) -> Primary {
+    let ray = new_ray(origin, w, params.reach);
+    let hit = walk(ray, params.falloff == STEP, is_set(FRONT));
+    if hit.triangle == MISS {
+        return Primary(false, 1.0, params.radius);
+    }
+    return Primary(true, mu(hit.t), min(hit.t, params.radius));
+}
+
+// The secondary rays of one primary ray.
+struct Fan {
+    middle: vec3<f32>,
+    height: f32,
+    d1: vec3<f32>,
+    sin_theta: f32,
+    d2: vec3<f32>,
+}
+
+fn secondary(fan: Fan, i: u32, turned: f32) -> Ray {
+    let period = select(0.5, 1.0, is_set(ONE_SIDED));
+    let shift = select(0.0, turned, is_set(TURNED));
+    let at = turn((f32(i) + shift) * period / f32(params.secondary_rays));
+    let d = fan.d1 * at.x + fan.d2 * at.y;
+    let slope = at.y * fan.sin_theta;
+    let reach = params.secondary_radius;
+    var forth = reach;
+    if is_set(CLIPPED) && reach * slope > fan.height {
+        forth = fan.height / slope;
+    }
+    if is_set(ONE_SIDED) {
+        return new_ray(fan.middle, d, forth);
+    }
+    return new_ray(fan.middle - d * reach, d, reach + forth);
+}
+
+struct Decided {
+    hit: bool,
+    mu: f32,
+    closed: u32,
+}
+
+fn decide(origin: vec3<f32>, normal: vec3<f32>, t: vec3<f32>, b: vec3<f32>, place: vec2<f32>, shift: vec2<f32>) -> Decided {
+    let phi = turn(place.y);
+    let sin_theta = sqrt(place.x);
+    let cos_theta = sqrt(1.0 - place.x);
     let along = t * phi.x + b * phi.y;
     let w = along * sin_theta + normal * cos_theta;
-    if occluded(new_ray(origin, w, params.radius)) {
-        return 1u;
+    let first = primary(origin, w);
+    var decided = Decided(first.hit, first.mu, 0u);
+    if first.mu > 0.0 && params.secondary_rays > 0u {
+        let share = select(0.5, shift.x, is_set(JITTERED));
+        let fan = Fan(
+            origin + w * (share * first.length),
+            share * first.length * cos_theta,
+            t * phi.y - b * phi.x,
+            sin_theta,
+            along * cos_theta - normal * sin_theta,
+        );
+        for (var i = 0u; i < params.secondary_rays; i++) {
+            decided.closed |= select(0u, 1u << i, occluded(secondary(fan, i, shift.y), is_set(FRONT)));
+        }
     }
-    if params.estimator == 0u {
-        return 0u;
-    }
-    let d1 = t * phi.y - b * phi.x;
-    let d2 = along * cos_theta - normal * sin_theta;
-    let reach = params.secondary_radius;
-    let middle = origin + w * (0.5 * params.radius);
-    let height = 0.5 * params.radius * cos_theta;
-    var down = reach;
-    if params.estimator == 2u && reach * sin_theta > height {
-        down = height / sin_theta;
-    }
-    let first = occluded(new_ray(middle - d1 * reach, d1, 2.0 * reach));
-    let second = occluded(new_ray(middle - d2 * reach, d2, reach + down));
-    return select(0u, 2u, first) | select(0u, 4u, second);
+    return decided;
 }
 
 @compute @workgroup_size(64)
-fn open_halves(@builtin(global_invocation_id) id: vec3<u32>) {
+fn openness(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= params.pixels {
         return;
     }
@@ -120,27 +202,32 @@ fn open_halves(@builtin(global_invocation_id) id: vec3<u32>) {
     let origin = surface.point + surface.normal * params.offset;
     let frame = tangents(surface.normal);
     let sampler = sampler_seed(params.seed, pixel, params.replicate);
-    var open = 0u;
+    let chance = (params.options & (JITTERED | TURNED)) != 0u;
+    var sum = 0.0;
     var done = 0u;
-    var decided = decisions[pixel];
+    var decisions_here = decisions[pixel];
     for (var i = params.first_ray; i < params.first_ray + params.rays; i++) {
-        let closed = decide(origin, surface.normal, frame[0], frame[1], pair(sampler, i, 0u));
-        if (closed & 1u) == 0u {
-            open += 2u - countOneBits(closed);
+        var shift = vec2<f32>();
+        if chance {
+            shift = pair(sampler, i, 1u);
         }
+        let decided = decide(origin, surface.normal, frame[0], frame[1], pair(sampler, i, 0u), shift);
+        // In units of one secondary ray, so that without falloff the sum is exact.
+        let units = select(1.0, f32(params.secondary_rays - countOneBits(decided.closed)), params.secondary_rays > 0u);
+        sum += decided.mu * units;
         if i < 32u {
-            decided.primary |= (closed & 1u) << i;
-            decided.first |= ((closed >> 1u) & 1u) << i;
-            decided.second |= ((closed >> 2u) & 1u) << i;
+            decisions_here.primary |= select(0u, 1u << i, decided.hit);
+            decisions_here.first |= (decided.closed & 1u) << i;
+            decisions_here.second |= ((decided.closed >> 1u) & 1u) << i;
         }
         done++;
     }
     // Mesa's software driver stops all loops of an invocation after 65,535
     // iterations; what it has then is wrong and must not pass.
-    if done != params.rays || halves[pixel] == STOPPED {
-        halves[pixel] = STOPPED;
+    if done != params.rays || sums[pixel] == STOPPED {
+        sums[pixel] = STOPPED;
         return;
     }
-    halves[pixel] += open;
-    decisions[pixel] = decided;
+    sums[pixel] += sum;
+    decisions[pixel] = decisions_here;
 }

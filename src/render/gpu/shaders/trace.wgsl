@@ -98,8 +98,15 @@ fn enter(node: u32, ray: Ray, tmax: f32) -> f32 {
     return select(2.0 * FAR_AWAY, near, near <= far * 1.0000004);
 }
 
-// The nearest triangle on the ray, or with `any` the first one found.
-fn walk(ray: Ray, any: bool) -> Hit {
+// Whether a triangle turns its front against the ray.
+fn faces(triangle: u32, direction: vec3<f32>) -> bool {
+    let a = corner(triangle, 0u);
+    return dot(cross(corner(triangle, 1u) - a, corner(triangle, 2u) - a), direction) < 0.0;
+}
+
+// The nearest triangle on the ray, or with `any` the first one found; with
+// `front` only of those that face it.
+fn walk(ray: Ray, any: bool, front: bool) -> Hit {
     var best = Hit(MISS, ray.tmax, vec3<f32>());
     var stack: array<u32, STACK>;
     var height = 0u;
@@ -113,7 +120,7 @@ fn walk(ray: Ray, any: bool) -> Hit {
         if count > 0u {
             for (var triangle = first; triangle < first + count; triangle++) {
                 let meeting = meets(ray, triangle, best.t);
-                if meeting.met {
+                if meeting.met && (!front || faces(triangle, ray.direction)) {
                     best = Hit(triangle, meeting.t, meeting.weights);
                     if any {
                         return best;
@@ -142,6 +149,6 @@ fn walk(ray: Ray, any: bool) -> Hit {
     return best;
 }
 
-fn occluded(ray: Ray) -> bool {
-    return walk(ray, true).triangle != MISS;
+fn occluded(ray: Ray, front: bool) -> bool {
+    return walk(ray, true, front).triangle != MISS;
 }
