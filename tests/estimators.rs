@@ -339,6 +339,34 @@ fn local_indirect_light_has_its_closed_forms() {
     assert!((values[32 * 64 + 32] - 1.0).abs() < 1e-3, "{}", values[32 * 64 + 32]);
 }
 
+/// Energy: under a sky of radiance 1 no surface receives more than that sky, E/pi
+/// <= 1, however white the walls; in a white room it is nearly that, though light
+/// must come in through the window. Five standard errors; no pixel is NaN.
+#[test]
+fn no_light_is_made() {
+    let mut scene = library::scene("curtain-room").unwrap();
+    for o in &mut scene.objects {
+        o.material.base_color = [0.98; 3];
+    }
+    scene.measure.resolution = [26, 8];
+    scene.measure.pixel *= 8.0;
+    let geometry = Geometry::new(&scene).unwrap();
+    let view = scene.measure.view();
+    let mut loaded = Cpu.load(&geometry).unwrap();
+    let means: Vec<f64> = (0..24)
+        .map(|replicate| {
+            let job = Job { view: &view, estimator: Estimator::PathTraced, ao: scene.ao, rays: 64, seed: 5, replicate };
+            let values = loaded.render(&job).unwrap().values;
+            assert!(values.iter().all(|v| v.is_finite() && *v >= 0.0));
+            values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64
+        })
+        .collect();
+    let (mean, variance) = mean_variance(&means);
+    let se = (variance / means.len() as f64).sqrt();
+    // The walls absorb 2 % a bounce, and the window is a fortieth of the walls.
+    assert!(mean < 1.0 + 5.0 * se && mean > 0.4 && se < 0.02, "{mean} +- {se}");
+}
+
 /// A floor beside a red wall under ambient light turns red: colour bleeds.
 #[test]
 fn color_bleeds_from_a_wall() {

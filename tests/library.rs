@@ -45,6 +45,7 @@ fn every_built_in_scene_is_lit() {
             let light = path::irradiance(g, &gbuffer, 4, 1, 0);
             let mean = light.iter().sum::<f32>() / light.len() as f32;
             assert!(mean > 1e-4 && mean < 10.0, "{name}: {mean}");
+            assert!(light.iter().all(|l| l.is_finite() && *l >= 0.0), "{name}: light that is no number");
         }
     }
 }
