@@ -339,9 +339,9 @@ fn local_indirect_light_has_its_closed_forms() {
     assert!((values[32 * 64 + 32] - 1.0).abs() < 1e-3, "{}", values[32 * 64 + 32]);
 }
 
-/// Energy: under a sky of radiance 1 no surface receives more than that sky, E/pi
-/// <= 1, however white the walls; in a white room it is nearly that, though light
-/// must come in through the window. Five standard errors; no pixel is NaN.
+/// Energy: in a white room under a sky of radiance 1, many bounces from the window,
+/// the floor receives no more than the walls can keep. Five standard errors; no
+/// pixel is NaN.
 #[test]
 fn no_light_is_made() {
     let mut scene = library::scene("curtain-room").unwrap();
@@ -363,8 +363,9 @@ fn no_light_is_made() {
         .collect();
     let (mean, variance) = mean_variance(&means);
     let se = (variance / means.len() as f64).sqrt();
-    // The walls absorb 2 % a bounce, and the window is a fortieth of the walls.
-    assert!(mean < 1.0 + 5.0 * se && mean > 0.4 && se < 0.02, "{mean} +- {se}");
+    // An integrating sphere with a window of 2.2 % of its wall would read 0.53; the
+    // floor under a curtain reads less.
+    assert!(mean < 0.53 + 5.0 * se && mean > 0.3 && se < 0.02, "{mean} +- {se}");
 }
 
 /// A floor beside a red wall under ambient light turns red: colour bleeds.
