@@ -5,8 +5,8 @@
 
 use aogauge::{
     render::{
-        Estimator, Extension, Faces, Falloff, Frame, Geometry, Job, Openness, ReceiverPlane, Renderer, Scale,
-        SecondaryOrigin, Sides, cpu::Cpu, gpu::Gpu,
+        Estimator, Extension, Faces, Falloff, Frame, Geometry, Job, LocalIndirect, Openness, ReceiverPlane, Renderer,
+        Scale, SecondaryOrigin, Sides, cpu::Cpu, gpu::Gpu,
     },
     scenes::{AoScale, Scene, View, library},
 };
@@ -127,6 +127,32 @@ fn all_options_agree_ray_by_ray() {
     let estimators: Vec<Estimator> = methods.into_iter().map(Estimator::Openness).collect();
     compare("curtain-arcade", |s| s.measure.view(), 16, &estimators);
     compare("pillar", |s| View { resolution: [96, 64], ..s.look.view() }, 8, &estimators);
+}
+
+/// Local indirect light follows the same paths: few pixels differ by as much as a
+/// path that met something else, and images by channel are equal in the mean.
+#[test]
+fn local_indirect_light_agrees_path_by_path() {
+    let gpu = gpu();
+    let mut scene = library::scene("curtain-room").unwrap();
+    scene.objects[1].material.base_color = [0.8, 0.2, 0.1];
+    let geometry = Geometry::new(&scene).unwrap();
+    let (mut on_cpu, mut on_gpu) = (Cpu.load(&geometry).unwrap(), gpu.load(&geometry).unwrap());
+    let view = scene.measure.view();
+    for falloff in [Falloff::Step, Falloff::Exponential { extinction: 6.0 }] {
+        let estimator = Estimator::LocalIndirect(LocalIndirect { falloff, scale: Scale::default() });
+        let rays = 20;
+        let job = Job { view: &view, estimator, ao: scene.ao, rays, seed: 9, replicate: 0 };
+        let (a, b) = (on_cpu.render(&job).unwrap(), on_gpu.render(&job).unwrap());
+        let differ = a.values.iter().zip(&b.values).filter(|(a, b)| (**a - **b).abs() > 1e-4).count();
+        println!("{falloff:?}: {differ} of {} pixels", a.values.len());
+        assert!(differ as u64 * 10_000 <= a.values.len() as u64 * u64::from(rays), "{falloff:?}: {differ}");
+        let (a, b) = (a.colors.unwrap(), b.colors.unwrap());
+        for c in 0..3 {
+            let mean = |colors: &[[f32; 3]]| colors.iter().map(|v| f64::from(v[c])).sum::<f64>() / colors.len() as f64;
+            assert!((mean(&a) - mean(&b)).abs() < 1e-5, "channel {c}: {} and {}", mean(&a), mean(&b));
+        }
+    }
 }
 
 #[test]

@@ -265,7 +265,7 @@ impl Estimator {
 
     /// Whether the GPU computes it.
     pub fn is_on_gpu(&self) -> bool {
-        matches!(self, Estimator::Openness(_))
+        !matches!(self, Estimator::PathTraced)
     }
 }
 

@@ -1,11 +1,9 @@
 //! A scene on the GPU, and the dispatches that render it.
 
 use super::Gpu;
-use crate::render::{
-    Estimator, Faces, Falloff, Frame, Geometry, Job, Loaded, Openness, ReceiverPlane, RenderError, SecondaryOrigin,
-    Sides, ao::Decisions,
-};
-use aogauge_scenes::View;
+use super::params::{Params, Program, Stage};
+use crate::render::{Frame, Geometry, Job, Loaded, RenderError, ao::Decisions};
+use aogauge_scenes::luminance;
 use bytemuck::{Pod, Zeroable};
 use std::time::{Duration, Instant};
 use wgpu::util::DeviceExt;
@@ -16,12 +14,6 @@ use wgpu::util::DeviceExt;
 const RAYS_SOFTWARE: u64 = 1 << 19;
 const RAYS_HARDWARE: u64 = 1 << 23;
 
-/// Rays that one invocation traces at most. Mesa's software driver stops every
-/// loop of an invocation after 65,535 iterations in all, without a word; with 32
-/// rays, each with its two secondary rays may take 680 steps. The shader marks
-/// pixels where it happened all the same.
-const RAYS_AN_INVOCATION: u32 = 32;
-
 /// What the shader writes where its loops were stopped early.
 const STOPPED: f32 = -1.0;
 
@@ -30,35 +22,6 @@ const WORKGROUP: u32 = 64;
 
 /// A device that has not finished by then counts as hung.
 const PATIENCE: Duration = Duration::from_secs(120);
-
-/// `Params` of ao.wgsl.
-#[derive(Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-struct Params {
-    origin: [f32; 3],
-    width: u32,
-    origin_dx: [f32; 3],
-    first_pixel: u32,
-    origin_dy: [f32; 3],
-    pixels: u32,
-    direction: [f32; 3],
-    first_ray: u32,
-    direction_dx: [f32; 3],
-    rays: u32,
-    direction_dy: [f32; 3],
-    seed: u32,
-    replicate: u32,
-    radius: f32,
-    secondary_radius: f32,
-    offset: f32,
-    reach: f32,
-    falloff: u32,
-    unused: [u32; 2],
-    falloff_numbers: [f32; 3],
-    options: u32,
-    secondary_rays: u32,
-    unused_too: [u32; 3],
-}
 
 /// `Surface` of ao.wgsl.
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -73,6 +36,7 @@ struct Surface {
 /// Buffers that depend on the number of pixels.
 struct Images {
     pixels: u64,
+    stage: Stage,
     surfaces: wgpu::Buffer,
     sums: wgpu::Buffer,
     decisions: wgpu::Buffer,
@@ -85,6 +49,8 @@ pub(super) struct LoadedGpu<'a> {
     geometry: &'a Geometry,
     nodes: wgpu::Buffer,
     triangles: wgpu::Buffer,
+    /// Albedo and emission of each triangle, once a stage asks for them.
+    materials: Option<wgpu::Buffer>,
     params: wgpu::Buffer,
     images: Option<Images>,
 }
@@ -110,6 +76,7 @@ impl<'a> LoadedGpu<'a> {
                 geometry,
                 nodes: upload("nodes", nodes),
                 triangles: upload("triangles", triangles),
+                materials: None,
                 params: gpu.device.create_buffer(&wgpu::BufferDescriptor {
                     label: Some("params"),
                     size: size_of::<Params>() as u64,
@@ -121,7 +88,26 @@ impl<'a> LoadedGpu<'a> {
         })
     }
 
-    fn images(&self, pixels: u64) -> Result<Images, RenderError> {
+    /// Albedo, then emission, of each triangle in leaf order.
+    fn materials(&self) -> Result<wgpu::Buffer, RenderError> {
+        let of = |&t: &u32| {
+            let [a, e] = [self.geometry.albedo(t), self.geometry.emitted(t)];
+            [a.x, a.y, a.z, e.x, e.y, e.z]
+        };
+        let numbers: Vec<[f32; 6]> = self.geometry.tracer.source().iter().map(of).collect();
+        let contents: &[u8] = bytemuck::cast_slice(&numbers);
+        fits(self.gpu, "materials", contents.len() as u64)?;
+        Ok(self.gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("materials"),
+            contents,
+            usage: wgpu::BufferUsages::STORAGE,
+        }))
+    }
+
+    fn images(&mut self, pixels: u64, stage: Stage) -> Result<Images, RenderError> {
+        if stage == Stage::Indirect && self.materials.is_none() {
+            self.materials = Some(self.materials()?);
+        }
         let device = &self.gpu.device;
         let buffer = |label, stride: usize| -> Result<wgpu::Buffer, RenderError> {
             let size = pixels * stride as u64;
@@ -134,9 +120,11 @@ impl<'a> LoadedGpu<'a> {
             }))
         };
         let surfaces = buffer("surfaces", size_of::<Surface>())?;
-        let sums = buffer("sums", size_of::<f32>())?;
+        let sums = buffer("sums", size_of::<f32>() * stage.channels() as usize)?;
         let decisions = buffer("decisions", size_of::<Decisions>())?;
-        let buffers = [&self.params, &self.nodes, &self.triangles, &surfaces, &sums, &decisions];
+        // Stages that do not read materials are given something to bind.
+        let materials = self.materials.as_ref().unwrap_or(&self.triangles);
+        let buffers = [&self.params, &self.nodes, &self.triangles, &surfaces, &sums, &decisions, materials];
         let entries: Vec<wgpu::BindGroupEntry<'_>> = (0u32..)
             .zip(buffers)
             .map(|(binding, b)| wgpu::BindGroupEntry { binding, resource: b.as_entire_binding() })
@@ -146,62 +134,33 @@ impl<'a> LoadedGpu<'a> {
             layout: &self.gpu.layout,
             entries: &entries,
         });
-        Ok(Images { pixels, surfaces, sums, decisions, bind_group })
+        Ok(Images { pixels, stage, surfaces, sums, decisions, bind_group })
     }
 
     /// Sees, then shades, in pieces that are each a submission of their own. The
     /// timer counts shading, as the CPU's clock does.
-    fn dispatch(&self, job: &Job<'_>, method: &Openness, images: &Images, timer: Option<&Timer>) {
+    fn dispatch(&self, job: &Job<'_>, program: &Program, images: &Images, timer: Option<&Timer>) {
         let pixels = images.pixels as u32;
-        for (px, rays) in pieces(pixels, 1, self.budget()) {
-            self.submit(&self.gpu.see, self.params(job, method, px, rays), images, None);
+        let offset = self.geometry.tracer.offset();
+        let shade = match program.stage {
+            Stage::Openness => &self.gpu.openness,
+            Stage::Indirect => &self.gpu.indirect,
+        };
+        for (px, rays) in pieces(pixels, 1, 1, self.budget()) {
+            self.submit(&self.gpu.see, program.params(job, offset, px, rays), images, None);
         }
-        for (slot, (px, rays)) in (0..).zip(pieces(pixels, job.rays, self.budget())) {
-            let params = self.params(job, method, px, rays);
-            self.submit(&self.gpu.openness, params, images, timer.map(|t| (t, slot)));
+        for (slot, (px, rays)) in (0..).zip(self.pieces(job, program)) {
+            let params = program.params(job, offset, px, rays);
+            self.submit(shade, params, images, timer.map(|t| (t, slot)));
         }
+    }
+
+    fn pieces(&self, job: &Job<'_>, program: &Program) -> Vec<Piece> {
+        pieces(job.view.pixels() as u32, job.rays, program.rays_an_invocation(), self.budget())
     }
 
     fn budget(&self) -> u64 {
         if self.gpu.is_software() { RAYS_SOFTWARE } else { RAYS_HARDWARE }
-    }
-
-    fn params(
-        &self,
-        job: &Job<'_>,
-        method: &Openness,
-        pixels: std::ops::Range<u32>,
-        rays: std::ops::Range<u32>,
-    ) -> Params {
-        let ao = method.scale.on(job.ao);
-        let (falloff, falloff_numbers) = numbers(method.falloff);
-        let options = options(method);
-        let View { resolution, origin, origin_dx, origin_dy, direction, direction_dx, direction_dy } = *job.view;
-        Params {
-            origin: origin.to_array(),
-            width: resolution[0],
-            origin_dx: origin_dx.to_array(),
-            first_pixel: pixels.start,
-            origin_dy: origin_dy.to_array(),
-            pixels: pixels.len() as u32,
-            direction: direction.to_array(),
-            first_ray: rays.start,
-            direction_dx: direction_dx.to_array(),
-            rays: rays.len() as u32,
-            direction_dy: direction_dy.to_array(),
-            seed: job.seed,
-            replicate: job.replicate,
-            radius: ao.radius,
-            secondary_radius: ao.secondary_radius,
-            offset: self.geometry.tracer.offset(),
-            reach: method.falloff.reach(ao.radius),
-            falloff,
-            unused: [0; 2],
-            falloff_numbers,
-            options,
-            secondary_rays: method.extension.map_or(0, |e| e.secondary_rays),
-            unused_too: [0; 3],
-        }
     }
 
     fn submit(&self, pipeline: &wgpu::ComputePipeline, params: Params, images: &Images, timer: Option<(&Timer, u64)>) {
@@ -293,19 +252,17 @@ impl Timer {
 
 impl Loaded for LoadedGpu<'_> {
     fn render(&mut self, job: &Job<'_>) -> Result<Frame, RenderError> {
-        let Estimator::Openness(method) = &job.estimator else {
-            return Err(RenderError::Unsupported { renderer: "gpu", kind: job.estimator.kind(), knows: "openness" });
-        };
+        let program = Program::new(&job.estimator)?;
         let pixels = job.view.pixels() as u64;
         let images = match self.images.take() {
-            Some(images) if images.pixels == pixels => images,
-            _ => guarded(self.gpu, || self.images(pixels))?,
+            Some(images) if images.pixels == pixels && images.stage == program.stage => images,
+            _ => guarded(self.gpu, || self.images(pixels, program.stage))?,
         };
         let start = Instant::now();
         let frame = guarded(self.gpu, || {
-            let dispatches = pieces(pixels as u32, job.rays, self.budget()).len() as u64;
+            let dispatches = self.pieces(job, &program).len() as u64;
             let timer = self.gpu.tick.map(|_| Timer::new(self.gpu, dispatches));
-            self.dispatch(job, method, &images, timer.as_ref());
+            self.dispatch(job, &program, &images, timer.as_ref());
             let sums: Vec<f32> = self.read(&images.sums)?;
             let wall = start.elapsed().as_secs_f64();
             if sums.contains(&STOPPED) {
@@ -324,19 +281,12 @@ impl Loaded for LoadedGpu<'_> {
                 _ => wall,
             };
             let source = self.geometry.tracer.source();
+            let (values, colors) = finished(&program, &sums, &surfaces, job.rays);
             Ok(Frame {
                 resolution: job.view.resolution,
-                values: sums
-                    .iter()
-                    .zip(&surfaces)
-                    .map(
-                        |(&sum, s)| {
-                            if s.triangle == u32::MAX { f32::NAN } else { method.mean(f64::from(sum), job.rays) }
-                        },
-                    )
-                    .collect(),
-                colors: None,
-                decisions: Some(decisions),
+                values,
+                colors,
+                decisions: (program.stage == Stage::Openness).then_some(decisions),
                 seen: surfaces.iter().map(|s| source.get(s.triangle as usize).copied().unwrap_or(u32::MAX)).collect(),
                 seconds,
             })
@@ -346,34 +296,27 @@ impl Loaded for LoadedGpu<'_> {
     }
 }
 
-/// A falloff as the shader takes it.
-fn numbers(falloff: Falloff) -> (u32, [f32; 3]) {
-    match falloff {
-        Falloff::Step => (0, [0.0; 3]),
-        Falloff::Exponential { extinction } => (1, [extinction, 0.0, 0.0]),
-        Falloff::LinearTail { tail } => (2, [tail, 0.0, 0.0]),
-        Falloff::Gaussian { lambda, floor, reflectance } => (3, [lambda, floor, reflectance]),
+/// What a stage's sums mean: a value a pixel, and its colour where it has one.
+fn finished(program: &Program, sums: &[f32], surfaces: &[Surface], rays: u32) -> (Vec<f32>, Option<Vec<[f32; 3]>>) {
+    let missed = |s: &Surface| s.triangle == u32::MAX;
+    if program.stage == Stage::Openness {
+        let mean = |sum: f32| program.method.mean(f64::from(sum), rays);
+        let value = |(&sum, s): (&f32, &Surface)| if missed(s) { f32::NAN } else { mean(sum) };
+        return (sums.iter().zip(surfaces).map(value).collect(), None);
     }
-}
-
-/// Options as the shader takes them, a bit each.
-fn options(method: &Openness) -> u32 {
-    let of_extension = method.extension.map_or(0, |e| {
-        u32::from(e.receiver_plane == ReceiverPlane::Clipped) << 1
-            | u32::from(e.sides == Sides::One) << 2
-            | u32::from(e.origin == SecondaryOrigin::Jittered) << 3
-            | u32::from(e.is_turned()) << 4
-    });
-    u32::from(method.faces == Faces::Front) | of_extension
+    let mean = |sum: f32| (f64::from(sum) / f64::from(rays)) as f32;
+    let color = |(sum, s): (&[f32; 3], &Surface)| if missed(s) { [f32::NAN; 3] } else { sum.map(mean) };
+    let colors: Vec<[f32; 3]> = sums.as_chunks().0.iter().zip(surfaces).map(color).collect();
+    (colors.iter().map(|&c| luminance(c)).collect(), Some(colors))
 }
 
 /// A range of pixels and a range of rays.
 type Piece = (std::ops::Range<u32>, std::ops::Range<u32>);
 
 /// Splits a job so that no piece has more than `budget` rays, and no invocation
-/// more than [`RAYS_AN_INVOCATION`].
-fn pieces(pixels: u32, rays: u32, budget: u64) -> Vec<Piece> {
-    let ray_step = rays.clamp(1, RAYS_AN_INVOCATION);
+/// more than `most`.
+fn pieces(pixels: u32, rays: u32, most: u32, budget: u64) -> Vec<Piece> {
+    let ray_step = rays.clamp(1, most);
     // At most 65,535 workgroups a dispatch.
     let pixel_step = (budget / u64::from(ray_step)).clamp(u64::from(WORKGROUP), 65_535 * u64::from(WORKGROUP)) as u32;
     let mut pieces = Vec::new();
@@ -419,12 +362,12 @@ mod tests {
         for (pixels, rays, budget) in
             [(1u32, 1u32, 64u64), (6656, 32, 1 << 19), (6656, 512, 1 << 14), (100, 70_000, 1 << 19)]
         {
-            let pieces = pieces(pixels, rays, budget);
+            let pieces = pieces(pixels, rays, 32, budget);
             let total: u64 = pieces.iter().map(|(p, r)| p.len() as u64 * r.len() as u64).sum();
             assert_eq!(total, u64::from(pixels) * u64::from(rays));
             for (p, r) in &pieces {
-                assert!(p.len() as u64 * r.len() as u64 <= budget.max(u64::from(WORKGROUP * RAYS_AN_INVOCATION)));
-                assert!(r.len() as u32 <= RAYS_AN_INVOCATION);
+                assert!(p.len() as u64 * r.len() as u64 <= budget.max(u64::from(WORKGROUP * 32)));
+                assert!(r.len() as u32 <= 32);
             }
         }
     }

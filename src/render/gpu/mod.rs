@@ -2,14 +2,19 @@
 //! driver. Each WGSL stage stands beside its CPU twin under the same name.
 
 mod loaded;
+mod params;
 
 use super::{Geometry, Loaded, RenderError, Renderer};
 use loaded::LoadedGpu;
 use std::sync::{Arc, Mutex};
 
 /// The shader, its stages in order.
-const SHADER: &str =
-    concat!(include_str!("shaders/sampler.wgsl"), include_str!("shaders/trace.wgsl"), include_str!("shaders/ao.wgsl"));
+const SHADER: &str = concat!(
+    include_str!("shaders/sampler.wgsl"),
+    include_str!("shaders/trace.wgsl"),
+    include_str!("shaders/ao.wgsl"),
+    include_str!("shaders/indirect.wgsl")
+);
 
 /// A device with its pipelines.
 pub struct Gpu {
@@ -19,6 +24,7 @@ pub struct Gpu {
     layout: wgpu::BindGroupLayout,
     see: wgpu::ComputePipeline,
     openness: wgpu::ComputePipeline,
+    indirect: wgpu::ComputePipeline,
     /// Nanoseconds a tick, where the device has timestamp queries.
     tick: Option<f32>,
     /// What went wrong outside an error scope: a lost device, a driver's refusal.
@@ -114,12 +120,12 @@ impl Gpu {
                 cache: None,
             })
         };
-        let (see, openness) = (pipeline("see"), pipeline("openness"));
+        let (see, openness, indirect) = (pipeline("see"), pipeline("openness"), pipeline("indirect"));
         if let Some(e) = pollster::block_on(scope.pop()) {
             return Err(RenderError::Device(e.to_string()));
         }
         let tick = (!timestamps.is_empty()).then(|| queue.get_timestamp_period());
-        Ok(Gpu { info: adapter.get_info(), device, queue, layout, see, openness, tick, trouble })
+        Ok(Gpu { info: adapter.get_info(), device, queue, layout, see, openness, indirect, tick, trouble })
     }
 
     /// Adapter, driver and backend, for people.
@@ -159,6 +165,7 @@ fn bindings(device: &wgpu::Device) -> wgpu::BindGroupLayout {
             entry(3, storage(false)),
             entry(4, storage(false)),
             entry(5, storage(false)),
+            entry(6, storage(true)),
         ],
     })
 }
