@@ -160,6 +160,13 @@ pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
+/// The sRGB code of linear light, 1 for white; what is brighter is white too.
+pub fn srgb(v: f32) -> u8 {
+    let v = v.clamp(0.0, 1.0);
+    let encoded = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+    (encoded * 255.0).round() as u8
+}
+
 /// Writes an 8-bit RGB PNG.
 ///
 /// # Errors

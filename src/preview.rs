@@ -2,7 +2,7 @@
 
 use crate::{
     disk::DiskError,
-    layers::write_png,
+    layers::{srgb, write_png},
     render::{Geometry, RenderError, gbuffer::GBuffer, gbuffer::Surface, path},
     scenes::{Object, Scene, Texture, View, luminance},
 };
@@ -111,19 +111,7 @@ fn texel(texture: &Texture, object: &Object, triangle: usize, point: Vec3) -> Op
     let (v, w) = (p.cross(c - a).dot(n), (b - a).cross(p).dot(n));
     let [ta, tb, tc]: [Vec2; 3] = [0, 1, 2].map(|k| object.mesh.uvs.get(corners[k]).copied().unwrap_or_default());
     let uv = ta + ((tb - ta) * v + (tc - ta) * w) / n.length_squared();
-    let [r, g, b, _] = texture.at(uv);
-    Some(Vec3::new(linear(r), linear(g), linear(b)))
-}
-
-fn linear(encoded: u8) -> f32 {
-    let v = f32::from(encoded) / 255.0;
-    if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
-}
-
-fn encoded(v: f32) -> u8 {
-    let v = v.clamp(0.0, 1.0);
-    let v = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-    (v * 255.0).round() as u8
+    Some(texture.color(uv))
 }
 
 /// Holds each point to twice the median of its neighbours: a path that was lucky
@@ -162,7 +150,7 @@ fn developed(colors: &[Option<Vec3>], [width, height]: [u32; 2]) -> RgbImage {
     };
     RgbImage::from_fn(width / FINE, height / FINE, |x, y| {
         let sum = (0..FINE * FINE).map(|i| at(x * FINE + i % FINE, y * FINE + i / FINE)).sum::<Vec3>();
-        Rgb((sum / (FINE * FINE) as f32).to_array().map(encoded))
+        Rgb((sum / (FINE * FINE) as f32).to_array().map(srgb))
     })
 }
 

@@ -1,6 +1,6 @@
 //! Views for scenes that give none: found from the sheet and the receiver.
 
-use crate::{LookView, MeasureView, Object, closest_point};
+use crate::{LookView, MeasureView, Object, clip, closest_point};
 use glam::{Vec2, Vec3};
 
 /// Points of the sheet that are looked at, at most.
@@ -188,28 +188,12 @@ fn least_height(objects: &[Object], center: Vec3, normal: Vec3, transect: Vec3, 
         });
         let mut part = local.to_vec();
         for side in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y] {
-            part = cut(&part, |p| reach - p.dot(side));
+            part = clip(&part, |p| reach - p.dot(side));
         }
-        part = cut(&part, |p| p.z - floor);
+        part = clip(&part, |p| p.z - floor);
         least = part.iter().map(|p| p.z).fold(least, f32::min);
     }
     least
-}
-
-/// The part of a convex polygon where `inside` is 0 or more.
-fn cut(polygon: &[Vec3], inside: impl Fn(Vec3) -> f32) -> Vec<Vec3> {
-    let mut kept = Vec::with_capacity(polygon.len() + 1);
-    for (i, &a) in polygon.iter().enumerate() {
-        let b = polygon[(i + 1) % polygon.len()];
-        let (da, db) = (inside(a), inside(b));
-        if da >= 0.0 {
-            kept.push(a);
-        }
-        if (da < 0.0) != (db < 0.0) {
-            kept.push(a + (b - a) * (da / (da - db)));
-        }
-    }
-    kept
 }
 
 /// A look view on the middle of a measure view, from the right and above.

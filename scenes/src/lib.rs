@@ -33,7 +33,7 @@ pub use environment::{Environment, Portal, Sky};
 pub use file::{Parameters, SceneError};
 pub use light::{Light, LightKind};
 pub use material::{MAX_ALBEDO, Material, luminance};
-pub use mesh::{Mesh, MeshError, closest_point};
+pub use mesh::{Mesh, MeshError, clip, closest_point};
 pub use scene::{AoScale, Object, Scene};
 pub use texture::{Texture, Wrap};
 pub use view::{LookView, MeasureView, View};

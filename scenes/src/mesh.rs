@@ -190,6 +190,23 @@ pub fn closest_point(p: Vec3, &[a, b, c]: &[Vec3; 3]) -> Vec3 {
     a + ab * (vb / sum) + ac * (vc / sum)
 }
 
+/// The part of a convex polygon where `inside` is 0 or more (Sutherland-Hodgman);
+/// `inside` must be linear.
+pub fn clip(polygon: &[Vec3], inside: impl Fn(Vec3) -> f32) -> Vec<Vec3> {
+    let mut kept = Vec::with_capacity(polygon.len() + 1);
+    for (i, &a) in polygon.iter().enumerate() {
+        let b = polygon[(i + 1) % polygon.len()];
+        let (da, db) = (inside(a), inside(b));
+        if da >= 0.0 {
+            kept.push(a);
+        }
+        if (da < 0.0) != (db < 0.0) {
+            kept.push(a + (b - a) * (da / (da - db)));
+        }
+    }
+    kept
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

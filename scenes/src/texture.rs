@@ -1,6 +1,6 @@
 //! Pictures on surfaces, and what a triangle sees of them on the average.
 
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use std::sync::LazyLock;
 
 /// How a texture goes on beyond its edges.
@@ -51,6 +51,12 @@ impl Texture {
         let column = self.wrap[0].texel(f64::from(uv.x) * f64::from(w), w);
         let row = self.wrap[1].texel(f64::from(uv.y) * f64::from(h), h);
         self.texels.get(row as usize * w as usize + column as usize).copied().unwrap_or([0, 0, 0, 255])
+    }
+
+    /// The linear colour at texture coordinates, a channel 0 to 1.
+    pub fn color(&self, uv: Vec2) -> Vec3 {
+        let [r, g, b, _] = self.at(uv);
+        Vec3::from_array([r, g, b].map(|byte| srgb(byte) as f32))
     }
 
     /// Mean over the whole picture: red, green and blue, decoded by `decode`.

@@ -6,7 +6,7 @@ use crate::{
     render::gbuffer::{GBuffer, Surface},
     trace::Tracer,
 };
-use aogauge_scenes::Scene;
+use aogauge_scenes::{Scene, clip};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -255,22 +255,6 @@ fn nearest_of_polygon(polygon: &[Vec2]) -> Option<Vec2> {
             a + e * t
         })
         .min_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))
-}
-
-/// The part of a convex polygon where `inside` is 0 or more (Sutherland-Hodgman).
-fn clip(polygon: &[Vec3], inside: impl Fn(Vec3) -> f32) -> Vec<Vec3> {
-    let mut kept = Vec::with_capacity(polygon.len() + 1);
-    for (i, &a) in polygon.iter().enumerate() {
-        let b = polygon[(i + 1) % polygon.len()];
-        let (da, db) = (inside(a), inside(b));
-        if da >= 0.0 {
-            kept.push(a);
-        }
-        if (da < 0.0) != (db < 0.0) {
-            kept.push(a + (b - a) * (da / (da - db)));
-        }
-    }
-    kept
 }
 
 #[cfg(test)]

@@ -1,6 +1,9 @@
 //! Pictures of float images.
 
-use crate::{disk::DiskError, layers::write_png};
+use crate::{
+    disk::DiskError,
+    layers::{srgb, write_png},
+};
 use image::{Rgb, RgbImage};
 use std::path::Path;
 
@@ -44,11 +47,4 @@ fn white(values: impl Iterator<Item = f32>) -> f32 {
     let mut sorted: Vec<f32> = values.filter(|v| v.is_finite()).collect();
     sorted.sort_by(f32::total_cmp);
     sorted.get(sorted.len() * 98 / 100).copied().unwrap_or(1.0).max(f32::MIN_POSITIVE)
-}
-
-/// An sRGB code of linear light, 1 for white.
-fn srgb(v: f32) -> u8 {
-    let v = v.clamp(0.0, 1.0);
-    let encoded = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-    (encoded * 255.0).round() as u8
 }
