@@ -389,10 +389,45 @@ shape = {{ polygons = {{ positions = [[0, 0, 0.35], [0, 1, 0.35], [0, 1, 0.9], [
         assert!(left.abs_diff(right) <= 8 && left > 1200, "{left}, {right}");
     }
 
-    /// A pleated sheet of no thickness: the footprint is what lies within 0.02 R of
-    /// the zigzag of its hem, flanks what lies 0.15 R to 0.45 R from it.
+    /// A folded sheet of no thickness: the footprint is what lies within 0.02 R of
+    /// the line of its hem, flanks what lies 0.15 R to 0.45 R from it.
     #[test]
-    fn under_pleats_the_regions_follow_the_hem() {
+    fn under_folds_the_regions_follow_the_hem() {
+        for folds in ["pleated", "wavy"] {
+            follows_the_hem(folds);
+        }
+    }
+
+    /// What hangs over a floor stands beside a wall just as well: the same scene,
+    /// turned by a quarter, has the same regions.
+    #[test]
+    fn a_wall_has_the_regions_of_a_floor() {
+        let floor = folded("wavy");
+        let mut wall = floor.clone();
+        let turn = |v: Vec3| Vec3::new(v.y, -v.x, v.z);
+        wall.objects.iter_mut().flat_map(|o| &mut o.mesh.positions).for_each(|p| *p = turn(*p));
+        let m = &mut wall.measure;
+        (m.center, m.normal, m.transect) = (turn(m.center), turn(m.normal), turn(m.transect));
+        let of = |scene: &Scene| {
+            let geometry = Geometry::new(scene).unwrap();
+            let gbuffer = GBuffer::new(&geometry.tracer, &scene.measure.view());
+            Regions::new(scene, &geometry.tracer, &gbuffer)
+        };
+        let (a, b) = (of(&floor), of(&wall));
+        for region in Region::ALL {
+            let both = a.pixels(region).iter().filter(|i| b.pixels(region).contains(i)).count();
+            // An edge of a region may lie on a pixel's centre but for rounding.
+            let least = (a.pixels(region).len().max(b.pixels(region).len()) as f64 * 0.995) as usize;
+            assert!(
+                both >= least && (both > 100 || region == Region::Far),
+                "{region:?}: {both} of {}",
+                a.pixels(region).len()
+            );
+        }
+    }
+
+    /// A folded sheet over a floor.
+    fn folded(folds: &str) -> Scene {
         let text = r#"
 description = "x"
 ao = { radius = 0.25 }
@@ -405,9 +440,13 @@ shape = { plane = { center = [0, 0, 0], u = [0, 0, 6], v = [6, 0, 0] } }
 [[object]]
 name = "sheet"
 occluder = true
-shape = { curtain = { thickness = 0, gap = 0.05, height = 1.0, length = 2.0, folds = "pleated", pleat_width = 0.1, pleat_depth = 0.06 } }
+shape = { curtain = { thickness = 0, gap = 0.05, height = 1.0, length = 2.0, folds = "FOLDS", pleat_width = 0.1, pleat_depth = 0.06 } }
 "#;
-        let scene = Scene::from_toml("x", "x.toml", text, None).unwrap();
+        Scene::from_toml("x", "x.toml", &text.replace("FOLDS", folds), None).unwrap()
+    }
+
+    fn follows_the_hem(folds: &str) {
+        let scene = folded(folds);
         let geometry = Geometry::new(&scene).unwrap();
         let gbuffer = GBuffer::new(&geometry.tracer, &scene.measure.view());
         let regions = Regions::new(&scene, &geometry.tracer, &gbuffer);

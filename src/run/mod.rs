@@ -41,6 +41,18 @@ pub enum RunError {
         /// The object it sees.
         object: String,
     },
+    /// The measure view of a scene ends within a flank.
+    #[error(
+        "scene '{scene}': the measure view ends within the {flank} flank; raise measure.resolution[0], {columns} now, so that it spans 2 R to each side where the receiver reaches that far"
+    )]
+    CutsFlank {
+        /// The scene.
+        scene: String,
+        /// `left` or `right`.
+        flank: &'static str,
+        /// Width of the view, pixels.
+        columns: u32,
+    },
     /// No light reaches the receiver, so there is nothing to judge.
     #[error(
         "scene '{scene}': no light reaches the receiver even without the occluder; check environment and the openings towards it"

@@ -78,6 +78,9 @@ impl<'a> Set<'a> {
         if regions.pixels(Region::All).is_empty() {
             return Err(RunError::SeesNothing { scene: name() });
         }
+        if let Some(flank) = cut_flank(&regions, view.resolution[0]) {
+            return Err(RunError::CutsFlank { scene: name(), flank: flank.label(), columns: view.resolution[0] });
+        }
         let mut twin = None;
         if scene.has_occluder() {
             let mut bare = Geometry::new(&scene.twin()).map_err(render_error(&scene))?;
@@ -338,6 +341,12 @@ impl<'a> Set<'a> {
             look,
         })
     }
+}
+
+/// A flank that reaches the view's first or last column, and may go on beyond.
+fn cut_flank(regions: &Regions, width: u32) -> Option<Region> {
+    let outer = |i: &u32| [0, width - 1].contains(&(i % width));
+    [Region::Left, Region::Right].into_iter().find(|&flank| regions.pixels(flank).iter().any(outer))
 }
 
 fn render_error(scene: &Scene) -> impl Fn(RenderError) -> RunError + use<> {
