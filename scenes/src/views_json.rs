@@ -88,7 +88,8 @@ mod tests {
 
     #[test]
     fn the_light_is_told_as_in_the_scene_file() {
-        let views = |name: &str| -> Value { serde_json::from_str(&views_json(&library::scene(name).unwrap())).unwrap() };
+        let views =
+            |name: &str| -> Value { serde_json::from_str(&views_json(&library::scene(name).unwrap())).unwrap() };
         assert_eq!(
             views("curtain-arcade")["environment"],
             json!({ "radiance": 1.0, "portals": [{ "corner": [0.0, 4.5, -3.0], "u": [4.0, 0.0, 0.0], "v": [0.0, 0.0, 6.0] }] })
