@@ -85,7 +85,7 @@ fn page(scene: &Scene) -> String {
          ## What is here\n\n\
          - `{name}.glb`: the scene, metres, +Y up, right-handed (glTF 2.0). Nodes of occluders carry `extras.aogauge.occluder`.\n\
          - `{name}.toml`: the scene file for it, with the light and R; `aogauge scene show {name}.toml` reads both back as the same scene.\n{twin}\
-         - `views.json`: both views, R and R' as numbers. The glb holds them too, as the cameras `measure` (orthographic) and `look` (perspective).\n\
+         - `views.json`: both views, the sky and its openings, R and R' as numbers. The glb holds them too, as the cameras `measure` (orthographic) and `look` (perspective).\n\
          - `regions.exr`: masks of 0 and 1 in the measure view: all, footprint, left, right, far.\n\
          - `gbuffer.exr`: position and geometric normal behind each pixel centre of the measure view; NaN where there is none.\n\n\
          ## What to render\n\n\
@@ -93,7 +93,7 @@ fn page(scene: &Scene) -> String {
          2. Openness, linear and without a transfer curve: 1 is fully open, 0 closed. Not occlusion, not multiplied with a colour, not blurred.\n\
          3. Rays of length R = {} m, cosine distributed about the geometric normal.\n\
          4. Half the secondary ray, for the extended method: R' = {} m.\n\
-         5. AO needs no light. The judge's light is {}; the glb does not hold it.\n\
+         5. AO needs no light. The judge's light is {}: see `environment` in `views.json`.\n\
          6. Several images with seeds of their own, better than one with more rays: intervals are taken over them.\n\n\
          ## How to name it\n\n\
          `{name}.<estimator>.<rays>.<replicate>.exr`, 32-bit float, one channel `Y` (or the same value in R, G and B); \

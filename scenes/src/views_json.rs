@@ -1,9 +1,11 @@
 //! The views of a scene as JSON, for programs that render it.
 
-use crate::{Scene, View};
+use crate::{Environment, Scene, Sky, View};
 use serde_json::{Value, json};
 
-/// The measure and look views, R and R' as JSON.
+/// The measure and look views, the distant light, R and R' as JSON.
+///
+/// `environment` is written as in a scene file.
 ///
 /// `rays` gives each camera as two affine maps: the ray through the image point
 /// (x, y), in pixels from the top left corner, starts at
@@ -24,6 +26,7 @@ pub fn views_json(scene: &Scene) -> String {
         "scene": scene.name,
         "unit": "metre",
         "ao": { "radius": scene.ao.radius, "secondary_radius": scene.ao.secondary_radius },
+        "environment": environment(&scene.environment),
         "measure": {
             "camera": "measure",
             "projection": "orthographic",
@@ -51,6 +54,22 @@ pub fn views_json(scene: &Scene) -> String {
     format!("{value:#}")
 }
 
+fn environment(environment: &Environment) -> Value {
+    let portals: Vec<Value> = environment
+        .portals
+        .iter()
+        .map(|p| json!({ "corner": p.corner.to_array(), "u": p.u.to_array(), "v": p.v.to_array() }))
+        .collect();
+    match environment.sky {
+        Sky::None => json!({ "portals": portals }),
+        Sky::Uniform(radiance) => json!({ "radiance": radiance, "portals": portals }),
+        Sky::Gradient { zenith, horizon, ground } => json!({
+            "gradient": { "zenith": zenith, "horizon": horizon, "ground": ground },
+            "portals": portals,
+        }),
+    }
+}
+
 fn rays(view: &View) -> Value {
     json!({
         "origin": view.origin.to_array(),
@@ -60,4 +79,21 @@ fn rays(view: &View) -> Value {
         "direction_dx": view.direction_dx.to_array(),
         "direction_dy": view.direction_dy.to_array(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{library, views_json};
+    use serde_json::{Value, json};
+
+    #[test]
+    fn the_light_is_told_as_in_the_scene_file() {
+        let views =
+            |name: &str| -> Value { serde_json::from_str(&views_json(&library::scene(name).unwrap())).unwrap() };
+        assert_eq!(
+            views("curtain-arcade")["environment"],
+            json!({ "radiance": 1.0, "portals": [{ "corner": [0.0, 4.5, -3.0], "u": [4.0, 0.0, 0.0], "v": [0.0, 0.0, 6.0] }] })
+        );
+        assert_eq!(views("curtain-open")["environment"], json!({ "radiance": 1.0, "portals": [] }));
+    }
 }
