@@ -1,6 +1,6 @@
 //! A scene: objects, light, scale and views.
 
-use crate::{Camera, Environment, Light, LightKind, LookView, Material, MeasureView, Mesh, Sky, luminance};
+use crate::{Camera, Environment, Light, LightKind, LookView, Material, MeasureView, Mesh, Sky};
 use glam::Vec3;
 use sha2::{Digest, Sha256};
 use std::borrow::Cow;
@@ -99,65 +99,77 @@ impl Scene {
     /// geometry, materials, light, scale, measure view. Names, descriptions, the
     /// look view and other cameras do not count.
     pub fn hash(&self) -> String {
-        let mut sha = Sha256::new();
-        let mut floats = |values: &[f32]| {
-            for v in values {
-                sha.update(v.to_bits().to_le_bytes());
-            }
-        };
-        floats(&[self.ao.radius, self.ao.secondary_radius]);
+        let mut digest = Digester(Sha256::new());
+        digest.floats(&[self.ao.radius, self.ao.secondary_radius]);
         match self.environment.sky {
-            Sky::None => floats(&[0.0]),
-            Sky::Uniform(radiance) => floats(&[radiance]),
-            // Begins with what no radiance can be, to tell it from a uniform sky.
-            Sky::Gradient { zenith, horizon, ground } => floats(&[-1.0, zenith, horizon, ground]),
+            Sky::None => digest.floats(&[]),
+            Sky::Uniform(radiance) => digest.floats(&[radiance]),
+            Sky::Gradient { zenith, horizon, ground } => digest.floats(&[zenith, horizon, ground]),
         }
+        digest.count(self.environment.portals.len());
         for p in &self.environment.portals {
-            for v in [p.corner, p.u, p.v] {
-                floats(&v.to_array());
-            }
+            digest.vectors(&[p.corner, p.u, p.v]);
         }
         let m = &self.measure;
-        for v in [m.center, m.normal, m.transect] {
-            floats(&v.to_array());
-        }
-        floats(&[m.clearance, m.pixel]);
+        digest.vectors(&[m.center, m.normal, m.transect]);
+        digest.floats(&[m.clearance, m.pixel]);
+        m.resolution.iter().for_each(|&n| digest.count(n as usize));
+        digest.count(self.lights.len());
         for light in &self.lights {
-            floats(&light_numbers(light));
+            digest.floats(&light_numbers(light));
         }
-        for o in &self.objects {
-            let [r, g, b] = o.material.albedo();
-            floats(&[luminance([r, g, b])]);
-            if r != g || g != b {
-                floats(&[r, g, b]);
-            }
-            floats(&[f32::from(u8::from(o.occluder))]);
-            if o.material.emissive != [0.0; 3] {
-                floats(&o.material.emissive);
-            }
-            let textures = o.material.textures();
-            if textures.iter().any(Option::is_some) {
-                floats(&o.material.base_color);
-                floats(&[o.material.metallic]);
-                o.mesh.uvs.iter().for_each(|uv| floats(&uv.to_array()));
-            }
-            for (slot, texture) in textures.iter().enumerate() {
-                let Some(texture) = texture else { continue };
-                floats(&[slot as f32]);
-                floats(&texture.size.map(|n| n as f32));
-                floats(&texture.wrap.map(|w| f32::from(w as u8)));
-                texture.texels.iter().for_each(|texel| floats(&texel.map(f32::from)));
-            }
-            for corners in o.mesh.corners() {
-                for v in corners {
-                    floats(&v.to_array());
-                }
-            }
+        digest.count(self.objects.len());
+        for object in &self.objects {
+            digest.object(object);
         }
-        for n in m.resolution {
-            sha.update(n.to_le_bytes());
+        digest.0.finalize().iter().map(|b| format!("{b:02x}")).collect()
+    }
+}
+
+/// Takes everything in with its length, so that no two scenes sound alike.
+struct Digester(Sha256);
+
+impl Digester {
+    fn count(&mut self, n: usize) {
+        self.0.update((n as u64).to_le_bytes());
+    }
+
+    fn floats(&mut self, values: &[f32]) {
+        self.count(values.len());
+        for v in values {
+            self.0.update(v.to_bits().to_le_bytes());
         }
-        sha.finalize().iter().map(|b| format!("{b:02x}")).collect()
+    }
+
+    fn vectors(&mut self, vectors: &[Vec3]) {
+        self.count(vectors.len());
+        for v in vectors {
+            v.to_array().iter().for_each(|c| self.0.update(c.to_bits().to_le_bytes()));
+        }
+    }
+
+    fn object(&mut self, o: &Object) {
+        let m = &o.material;
+        self.floats(&[f32::from(u8::from(o.occluder)), m.metallic]);
+        self.floats(&m.base_color);
+        self.floats(&m.emissive);
+        let textures = m.textures();
+        for texture in textures {
+            let Some(texture) = texture else {
+                self.count(0);
+                continue;
+            };
+            self.count(1);
+            texture.size.iter().for_each(|&n| self.count(n as usize));
+            self.0.update(texture.wrap.map(|w| w as u8));
+            texture.texels.iter().for_each(|texel| self.0.update(texel));
+        }
+        if textures.iter().any(Option::is_some) {
+            self.count(o.mesh.uvs.len());
+            o.mesh.uvs.iter().for_each(|uv| self.floats(&uv.to_array()));
+        }
+        self.count(o.mesh.triangles.len());
+        o.mesh.corners().for_each(|corners| self.vectors(&corners));
     }
 }
 

@@ -31,7 +31,8 @@ pub struct Args {
     /// The method; classic unless given.
     #[arg(long, value_enum, conflicts_with = "preset")]
     estimator: Option<Kind>,
-    /// A method as an engine or the paper sets it.
+    /// A method as an engine or the paper sets it: unity-low, unity-medium,
+    /// unity-high, unreal-default, microsoft-sample, paper-4, paper-32.
     #[arg(long)]
     preset: Option<String>,
     /// An option of the method as in a suite file, KEY=VALUE; may be repeated.

@@ -115,8 +115,8 @@ impl<'a> Shading<'a> {
                 directions: [d1, d2],
             };
             for i in 0..extension.secondary_rays {
-                let ray = fan.ray(i, shift[1], extension, self.ao.secondary_radius);
-                decided.closed |= u32::from(self.occluded(&ray)) << i;
+                let segment = fan.segment(i, shift[1], extension, self.ao.secondary_radius);
+                decided.closed |= u32::from(self.closed(&segment)) << i;
             }
         }
         decided
@@ -128,7 +128,7 @@ impl<'a> Shading<'a> {
     fn primary(&self, w: Vec3) -> (bool, f32, f32) {
         let radius = self.ao.radius;
         let falloff = self.method.falloff;
-        let ray = Ray::new(self.origin, w, falloff.reach(radius));
+        let ray = Ray::new(self.origin, w, self.method.reach(radius));
         if falloff == Falloff::Step {
             let hit = self.occluded(&ray);
             return (hit, f32::from(u8::from(!hit)), radius);
@@ -145,6 +145,21 @@ impl<'a> Shading<'a> {
         match self.method.faces {
             Faces::Both => self.tracer.occluded(ray),
             Faces::Front => self.tracer.occluded_by(ray, |corners| faces(corners, ray.direction)),
+        }
+    }
+
+    /// Whether a secondary ray is closed. Where back faces are culled it is two
+    /// rays, each away from the primary one: what faces a point is its front
+    /// whichever way the segment is walked.
+    #[inline]
+    fn closed(&self, segment: &Segment) -> bool {
+        let Segment { middle, direction, back, forth } = *segment;
+        match self.method.faces {
+            Faces::Both => self.occluded(&Ray::new(middle - direction * back, direction, back + forth)),
+            Faces::Front => {
+                self.occluded(&Ray::new(middle, direction, forth))
+                    || (back > 0.0 && self.occluded(&Ray::new(middle, -direction, back)))
+            }
         }
     }
 
@@ -179,11 +194,19 @@ struct Fan {
     directions: [Vec3; 2],
 }
 
+/// A secondary ray: from `back` behind its origin to `forth` beyond it.
+struct Segment {
+    middle: Vec3,
+    direction: Vec3,
+    back: f32,
+    forth: f32,
+}
+
 impl Fan {
     /// Secondary ray `i`: at an angle from d1 towards d2 of i/n of a half turn,
     /// of a whole turn where rays go one way.
     #[inline]
-    fn ray(&self, i: u32, turned: f32, extension: Extension, reach: f32) -> Ray {
+    fn segment(&self, i: u32, turned: f32, extension: Extension, reach: f32) -> Segment {
         let period = if extension.sides == Sides::Two { 0.5 } else { 1.0 };
         let turned = if extension.is_turned() { turned } else { 0.0 };
         let [c, s] = turn((i as f32 + turned) * period / extension.secondary_rays as f32);
@@ -195,10 +218,8 @@ impl Fan {
             ReceiverPlane::Clipped if reach * slope > self.height => self.height / slope,
             _ => reach,
         };
-        match extension.sides {
-            Sides::Two => Ray::new(self.middle - d * reach, d, reach + forth),
-            Sides::One => Ray::new(self.middle, d, forth),
-        }
+        let back = if extension.sides == Sides::Two { reach } else { 0.0 };
+        Segment { middle: self.middle, direction: d, back, forth }
     }
 }
 

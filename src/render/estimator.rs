@@ -229,6 +229,13 @@ impl Openness {
         }
     }
 
+    /// How far a primary ray must look, metres: beyond, mu is 1, and what is cut
+    /// for secondary rays ends at R.
+    pub fn reach(&self, radius: f32) -> f32 {
+        let reach = self.falloff.reach(radius);
+        if self.extension.is_some() { reach.max(radius) } else { reach }
+    }
+
     /// Openness from a sum over `rays` of [`Decided::units`](super::ao::Decided::units).
     pub fn mean(&self, sum: f64, rays: u32) -> f32 {
         let units = self.extension.map_or(1, |e| e.secondary_rays);

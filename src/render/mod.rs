@@ -91,12 +91,21 @@ impl Geometry {
             emission.clear();
         }
         let tracer = Tracer::new(&triangles);
-        let (offset, radius) = (tracer.offset(), scene.ao.radius);
-        if offset > MAX_OFFSET * radius {
-            let magnitude = offset * 2.0f32.powi(19);
-            return Err(RenderError::Rounding { magnitude, radius, largest: MAX_OFFSET * radius * 2.0f32.powi(19) });
-        }
+        check_rounding(&tracer, scene.ao.radius)?;
         Ok(Geometry { tracer, environment: scene.environment.clone(), lights, albedo, emission })
+    }
+
+    /// Whether an estimator's R, its own or that of `ao`, is large enough for the
+    /// scene's rounding errors.
+    ///
+    /// # Errors
+    /// [`RenderError::Rounding`] where it is not.
+    pub fn suits(&self, estimator: &Estimator, ao: AoScale) -> Result<(), RenderError> {
+        match estimator {
+            Estimator::Openness(o) => check_rounding(&self.tracer, o.scale.on(ao).radius),
+            Estimator::LocalIndirect(l) => check_rounding(&self.tracer, l.scale.on(ao).radius),
+            Estimator::PathTraced => Ok(()),
+        }
     }
 
     /// Linear diffuse albedo of a triangle: red, green and blue.
@@ -108,6 +117,16 @@ impl Geometry {
     pub fn emitted(&self, triangle: u32) -> Vec3 {
         self.emission.get(triangle as usize).map_or(Vec3::ZERO, |e| Vec3::from(*e))
     }
+}
+
+/// Whether R is large enough for the scene's rounding errors.
+fn check_rounding(tracer: &Tracer, radius: f32) -> Result<(), RenderError> {
+    let unit = 2.0f32.powi(19);
+    if tracer.offset() > MAX_OFFSET * radius {
+        let magnitude = tracer.offset() * unit;
+        return Err(RenderError::Rounding { magnitude, radius, largest: MAX_OFFSET * radius * unit });
+    }
+    Ok(())
 }
 
 /// Who computes images. A renderer loads a scene once and renders it often.
@@ -133,7 +152,7 @@ pub trait Loaded {
 pub enum RenderError {
     /// The scene is too large for its R in 32-bit floats.
     #[error(
-        "the scene reaches {magnitude} m from the centre of its measure view or the origin, but with ao.radius = {radius} m it must stay within {largest} m: beyond, rounding errors would show in openness"
+        "the scene reaches {magnitude} m from the centre of its measure view or the origin, but with R = {radius} m it must stay within {largest} m: beyond, rounding errors would show in openness"
     )]
     Rounding {
         /// The largest coordinate, metres.

@@ -272,6 +272,28 @@ look = {{ eye = [1, 1, 1], target = [0, 0, 0], resolution = [16, 16] }}
         }
     }
 
+    /// Direct light of a rectangular lamp 2a x 2b overhead at height h is its form
+    /// factor (Hottel): each quarter gives
+    /// (A/sqrt(1+A^2) atan(B/sqrt(1+A^2)) + B/sqrt(1+B^2) atan(A/sqrt(1+B^2))) / 2 pi
+    /// with A = a/h, B = b/h. However many ways there are to aim at it, the mean is
+    /// that, within five standard errors of less than 0.1 %.
+    #[test]
+    fn a_lamp_gives_its_form_factor() {
+        let lamp = "[[object]]\nname = 'floor'\nalbedo = 0\nshape = { plane = { center = [0, 0, 0], u = [0, 0, 9], v = [9, 0, 0] } }\n\
+             [[object]]\nname = 'lamp'\nalbedo = 0\nemission = [3, 3, 3]\nshape = { plane = { center = [0, 0.8, 0], u = [1, 0, 0], v = [0, 0, 0.6] } }";
+        let (a, b): (f64, f64) = (0.5 / 0.8, 0.3 / 0.8);
+        let part = |a: f64, b: f64| a / a.hypot(1.0) * (b / a.hypot(1.0)).atan();
+        let expected = 3.0 * 4.0 * (part(a, b) + part(b, a)) / std::f64::consts::TAU;
+        let whole = "{ corner = [-0.5, 0.8, -0.3], u = [1, 0, 0], v = [0, 0, 0.6] }";
+        let half = "{ corner = [-0.5, 0.8, -0.3], u = [0.5, 0, 0], v = [0, 0, 0.6] }";
+        let beside = "{ corner = [0.2, 0.5, -0.3], u = [1, 0, 0], v = [0, 0, 0.6] }";
+        for portals in ["", whole, half, beside, &format!("{whole}, {beside}")] {
+            let g = lit(lamp, &format!("{{ portals = [{portals}] }}"));
+            let (m, se) = mean(&g, Vec3::ZERO, Vec3::Y, 200_000);
+            assert!(se < 1e-3 * expected && (m - expected).abs() < 5.0 * se, "{portals}: {m} +- {se}, {expected}");
+        }
+    }
+
     /// A point light over a floor: I cos / (pi d^2), of each colour, and none in
     /// the shadow of a block.
     #[test]

@@ -68,6 +68,9 @@ impl<'a> Set<'a> {
             return Err(RunError::TooMuch { scene: name(), gib });
         }
         let geometry = Geometry::new(&scene).map_err(render_error(&scene))?;
+        for method in &plan.suite.methods {
+            geometry.suits(&method.estimator, scene.ao).map_err(render_error(&scene))?;
+        }
         let gbuffer = GBuffer::new(&geometry.tracer, &view);
         let owner: Vec<usize> = scene.triangles().map(|(object, _)| object).collect();
         let mut seen = gbuffer.surfaces.iter().flatten().map(|s| &scene.objects[owner[s.triangle as usize]]);

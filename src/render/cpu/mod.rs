@@ -31,6 +31,7 @@ impl Renderer for Cpu {
 
 impl Loaded for LoadedCpu<'_> {
     fn render(&mut self, job: &Job<'_>) -> Result<Frame, RenderError> {
+        self.geometry.suits(&job.estimator, job.ao)?;
         let tracer = &self.geometry.tracer;
         let gbuffer = match &self.seen {
             Some((view, gbuffer)) if view == job.view => gbuffer,

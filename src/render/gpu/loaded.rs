@@ -253,6 +253,7 @@ impl Timer {
 impl Loaded for LoadedGpu<'_> {
     fn render(&mut self, job: &Job<'_>) -> Result<Frame, RenderError> {
         let program = Program::new(&job.estimator)?;
+        self.geometry.suits(&job.estimator, job.ao)?;
         let pixels = job.view.pixels() as u64;
         let images = match self.images.take() {
             Some(images) if images.pixels == pixels && images.stage == program.stage => images,

@@ -121,7 +121,7 @@ impl Program {
             radius: ao.radius,
             secondary_radius: ao.secondary_radius,
             offset,
-            reach: self.method.falloff.reach(ao.radius),
+            reach: self.method.reach(ao.radius),
             falloff,
             unused: [0; 2],
             falloff_numbers,

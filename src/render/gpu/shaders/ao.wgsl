@@ -142,7 +142,7 @@ struct Fan {
     d2: vec3<f32>,
 }
 
-fn secondary(fan: Fan, i: u32, turned: f32) -> Ray {
+fn closed(fan: Fan, i: u32, turned: f32) -> bool {
     let period = select(0.5, 1.0, is_set(ONE_SIDED));
     let shift = select(0.0, turned, is_set(TURNED));
     let at = turn((f32(i) + shift) * period / f32(params.secondary_rays));
@@ -153,10 +153,12 @@ fn secondary(fan: Fan, i: u32, turned: f32) -> Ray {
     if is_set(CLIPPED) && reach * slope > fan.height {
         forth = fan.height / slope;
     }
-    if is_set(ONE_SIDED) {
-        return new_ray(fan.middle, d, forth);
+    let back = select(reach, 0.0, is_set(ONE_SIDED));
+    if is_set(FRONT) {
+        return occluded(new_ray(fan.middle, d, forth), true)
+            || (back > 0.0 && occluded(new_ray(fan.middle, -d, back), true));
     }
-    return new_ray(fan.middle - d * reach, d, reach + forth);
+    return occluded(new_ray(fan.middle - d * back, d, back + forth), false);
 }
 
 struct Decided {
@@ -183,7 +185,7 @@ fn decide(origin: vec3<f32>, normal: vec3<f32>, t: vec3<f32>, b: vec3<f32>, plac
             along * cos_theta - normal * sin_theta,
         );
         for (var i = 0u; i < params.secondary_rays; i++) {
-            decided.closed |= select(0u, 1u << i, occluded(secondary(fan, i, shift.y), is_set(FRONT)));
+            decided.closed |= select(0u, 1u << i, closed(fan, i, shift.y));
         }
     }
     return decided;
