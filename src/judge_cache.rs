@@ -1,5 +1,7 @@
 //! The judge's images of earlier runs, by content: whatever could change a pixel
-//! is part of the name, so what is found is what would be traced again.
+//! is part of the name, so what is found is what would be traced again. (All but the
+//! system's mathematical library, which the tracer calls for the cones of spot
+//! lights alone.)
 //!
 //! The name is a hash over the program itself (its own executable file: another
 //! version, compiler or library makes another), the scene, paths, and seed. Each

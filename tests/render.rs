@@ -92,6 +92,8 @@ fn wrong_options_are_named() {
         (vec!["plain", "--out", "a.png"], "plain"),
         (vec!["plane", "--out", "a.png", "--set", "radius"], "KEY=VALUE"),
         (vec!["plane", "--out", "a.png", "--set", "raduis=1"], "raduis"),
+        (vec!["plane", "--out", "a.png", "--set", "rays=3"], "--rays"),
+        (vec!["plane", "--out", "a.png", "--set", "radius=1e-6"], "R = 0.000001 m"),
         (vec!["plane", "--out", "a.png", "--set", "radius=-1"], "radius is -1 m"),
         (vec!["plane", "--out", "a.png", "--set", "radius=1", "--set", "radius=2"], "twice"),
         (vec!["plane", "--out", "a.png", "--set", "faces=behind"], "behind"),
@@ -153,6 +155,45 @@ fn a_suite_takes_every_estimator() {
     fs::write(dir.path().join("bad.toml"), SUITE.replace("secondary_rays = 3", "secondary_rays = 0")).unwrap();
     let stderr = expect(2, dir.path(), &["run", "bad.toml", "--out", "out"]);
     assert!(stderr.contains("estimator 'obscurance'") && stderr.contains("1 to 8"), "{stderr}");
+}
+
+/// Every kind gives the same bytes on one thread and on three.
+#[test]
+fn results_do_not_depend_on_threads() {
+    let dir = tempfile::tempdir().unwrap();
+    let jittered = "[[estimator]]\nname = 'jittered'\nkind = 'extended'\nreceiver_plane = 'counts'\n\
+                    secondary_origin = 'jittered'\nsecondary_sides = 'one'\n";
+    fs::write(dir.path().join("suite.toml"), format!("{SUITE}{jittered}")).unwrap();
+    let records = ["1", "3"].map(|threads| {
+        let out = format!("out-{threads}");
+        let args = ["run", "suite.toml", "--no-cache", "--renderer", "cpu", "--threads", threads, "--out", &out];
+        expect(0, dir.path(), &args);
+        let record = Record::read(&dir.path().join(out)).unwrap();
+        assert_eq!(record.timing.threads.to_string(), threads);
+        (record.cases, serde_json::to_string(&record.scenes).unwrap())
+    });
+    let [(cases, scenes), (others, other_scenes)] = records;
+    assert_eq!(scenes, other_scenes);
+    for (a, b) in cases.iter().zip(&others) {
+        assert!(a.hash.is_some());
+        assert_eq!(a.hash, b.hash, "{}", a.case.id());
+    }
+}
+
+/// A judge that spent its budget says so in one sentence, and cells hold no text.
+#[test]
+fn an_imprecise_judge_is_told_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let vague = SUITE.replace("precision = 0.5", "precision = 0.001");
+    fs::write(dir.path().join("suite.toml"), vague).unwrap();
+    expect(0, dir.path(), &["run", "suite.toml", "--renderer", "cpu", "--out", "out"]);
+    let report = fs::read_to_string(dir.path().join("out/report.md")).unwrap();
+    let told = report.matches("less precise than asked").count();
+    assert!(told == 2, "the judge's line, and under the table: {told}\n{report}");
+    assert!(report.contains("No contrast error is taken from it"), "{report}");
+    let record = Record::read(&dir.path().join("out")).unwrap();
+    let json = serde_json::to_value(&record.scenes[0].judge).unwrap();
+    assert_eq!(json["stopped"], "budget");
 }
 
 /// The judge of an earlier run is used again where nothing has changed, and

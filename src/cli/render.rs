@@ -152,6 +152,9 @@ fn method(args: &Args) -> Result<(Estimator, Option<u32>), Failure> {
     for option in &args.options {
         let (key, value) =
             option.split_once('=').ok_or_else(|| Failure::usage(format!("--set '{option}': write KEY=VALUE")))?;
+        if key == "rays" {
+            return Err(Failure::usage("--set rays: give --rays"));
+        }
         if !OPTIONS.contains(&key) {
             return Err(Failure::usage(format!(
                 "--set '{option}': there is no option '{key}'; there are: {}",

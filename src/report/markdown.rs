@@ -49,6 +49,8 @@ struct SceneSection {
     cases: Vec<CaseRow>,
     regions: String,
     errors: Vec<String>,
+    /// Why cells hold no number.
+    absent: Vec<String>,
 }
 
 #[derive(Serialize)]
@@ -72,7 +74,8 @@ fn show(metric: Option<&Metric>) -> String {
         None => "–".to_owned(),
         Some(m) => match m.estimate() {
             Some(e) => plus_minus(e.value, e.interval(CONFIDENCE)),
-            _ => format!("none: {}", m.note.as_deref().unwrap_or("no interval")),
+            // Why stands under the table.
+            None => "–".to_owned(),
         },
     }
 }
@@ -89,7 +92,7 @@ fn case_row(record: &Record, case: &CaseRecord, has_judge: bool) -> CaseRow {
         openness: get(MetricName::Openness, Some(Region::All)),
         contrast: get(MetricName::Contrast, None),
         contrast_error: show(error),
-        reading: error.and_then(|m| m.note.clone()).unwrap_or_default(),
+        reading: error.filter(|m| m.value.is_some()).and_then(|m| m.note.clone()).unwrap_or_default(),
         removed: case
             .metric(MetricName::Removed, None)
             .filter(|m| m.value.is_some())
@@ -104,10 +107,17 @@ fn case_row(record: &Record, case: &CaseRecord, has_judge: bool) -> CaseRow {
 
 fn judge_text(scene: &SceneRecord) -> Option<String> {
     let judge = scene.judge.as_ref()?;
-    let reading = match judge.contrast.estimate().map(|e| e.interval(CONFIDENCE)) {
-        Some([lo, _]) if lo > 0.0 => "the highlight is real",
-        Some([_, hi]) if hi <= 0.0 => "there is no highlight",
-        _ => "the judge cannot tell whether there is a highlight",
+    let Some(contrast) = judge.contrast.estimate() else {
+        let why = judge.contrast.note.as_deref().unwrap_or("K(Q) is not known");
+        return Some(format!("No contrast error is taken from it: {why}. {} paths a pixel.", judge.paths));
+    };
+    let [lo, hi] = contrast.interval(CONFIDENCE);
+    let reading = if lo > 0.0 {
+        "the highlight is real"
+    } else if hi <= 0.0 {
+        "there is no highlight"
+    } else {
+        "the judge cannot tell whether there is a highlight"
     };
     let flank = match scene.brighter.get("Q") {
         Some(Brighter::Left) => "left",
@@ -127,7 +137,7 @@ fn judge_text(scene: &SceneRecord) -> Option<String> {
     let precision = judge.precision.map_or_else(|| "unknown".to_owned(), |p| format!("{:.2} %", p * 100.0));
     Some(format!(
         "K(Q) = {} against the {flank} flank: {reading}. Q: {}. {} replicates of {} paths a pixel, until {}; half width of the widest interval of a region mean: {precision}.",
-        show(Some(&judge.contrast)),
+        plus_minus(contrast.value, [lo, hi]),
         q.join(", "),
         judge.replicates,
         judge.paths,
@@ -152,8 +162,18 @@ fn section(record: &Record, scene: &SceneRecord) -> SceneSection {
         estimators: record.suite.estimators.clone(),
         cases: cases.iter().filter(|c| c.error.is_none()).map(|c| case_row(record, c, scene.judge.is_some())).collect(),
         regions: scene.regions.iter().map(|(r, n)| format!("{} {n}", r.label())).collect::<Vec<_>>().join(", "),
+        absent: absent(&cases),
         errors: cases.iter().filter_map(|c| Some(format!("`{}`: {}", c.case.id(), c.error.as_ref()?))).collect(),
     }
+}
+
+/// Each reason for a missing number once.
+fn absent(cases: &[&CaseRecord]) -> Vec<String> {
+    let metrics = cases.iter().flat_map(|c| &c.metrics).filter(|m| m.estimate().is_none());
+    let mut notes: Vec<String> = metrics.filter_map(|m| m.note.clone()).collect();
+    notes.sort();
+    notes.dedup();
+    notes
 }
 
 /// Cells of a table must not end it.
