@@ -16,7 +16,8 @@ use crate::{
 use std::path::Path;
 
 /// The built-in suites, by name.
-pub const BUILT_IN: [(&str, &str); 1] = [("thin-occluders", include_str!("thin-occluders.toml"))];
+pub const BUILT_IN: [(&str, &str); 2] =
+    [("thin-occluders", include_str!("thin-occluders.toml")), ("library", include_str!("library.toml"))];
 
 /// A method under a name.
 #[derive(Clone, Debug, PartialEq)]
@@ -221,11 +222,17 @@ mod tests {
 
     #[test]
     fn the_built_in_suites_load() {
+        let mut scenes = Vec::new();
         for (name, _) in BUILT_IN {
             let suite = Suite::load(name).unwrap_or_else(|e| panic!("{e}"));
-            assert_eq!(suite.scenes.len(), 7);
             assert!(!suite.gates.is_empty());
+            scenes.extend(suite.scenes.into_iter().map(|s| s.name));
         }
+        // Between them every scene of the library, once.
+        scenes.sort();
+        let mut all: Vec<&str> = aogauge_scenes::library::SCENES.iter().map(|(name, _)| *name).collect();
+        all.sort_unstable();
+        assert_eq!(scenes, all);
     }
 
     fn with(extra: &str) -> Result<Suite, SuiteError> {
