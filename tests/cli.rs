@@ -524,6 +524,9 @@ fn a_scene_can_be_shown_and_taken_elsewhere() {
         assert!(printed.contains(expected), "no {expected} in\n{printed}");
     }
     assert!(fs::read(&preview).unwrap().starts_with(b"\x89PNG"));
+    let jpeg = aogauge(&["scene", "show", "pillar", "--preview", text(&dir.path().join("preview.jpg"))]);
+    assert_eq!(jpeg.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&jpeg.stderr).contains("preview.jpg': it must end in .png"));
     let json: Value =
         serde_json::from_slice(&aogauge(&["scene", "show", "pillar", "--format", "json"]).stdout).unwrap();
     assert_eq!(json["parameters"]["ao"]["secondary_radius"], 0.0625);

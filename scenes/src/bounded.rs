@@ -2,8 +2,15 @@
 //! the TOML reader reports a bad value with its line and column.
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::{Deserialize, Deserializer, Serialize, de::Error};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 use std::{borrow::Cow, fmt::Display};
+
+/// Writes a number as the shortest decimal that reads back as it, also where the
+/// format has 64-bit numbers only: 0.03, not 0.029999999329447746.
+fn shortest<S: Serializer>(value: &f32, s: S) -> Result<S::Ok, S::Error> {
+    let short = value.to_string().parse().ok().filter(|&short: &f64| short as f32 == *value);
+    s.serialize_f64(short.unwrap_or(f64::from(*value)))
+}
 
 /// The complaint about a number outside its range.
 fn out_of_range<E: Error>(value: impl Display, range: impl Display) -> E {
@@ -17,7 +24,7 @@ macro_rules! ranged {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
         #[serde(transparent)]
-        pub struct $name<const MIN: $bound, const MAX: $bound>(pub f32);
+        pub struct $name<const MIN: $bound, const MAX: $bound>(#[serde(serialize_with = "shortest")] pub f32);
 
         impl<'de, const MIN: $bound, const MAX: $bound> Deserialize<'de> for $name<MIN, MAX> {
             fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
@@ -135,7 +142,7 @@ impl<const MIN: u32, const MAX: u32> JsonSchema for Count<MIN, MAX> {
 /// 100 m.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(transparent)]
-pub struct Thickness<const MIN: u32 = 100, const MAX: u32 = 100_000_000>(pub f32);
+pub struct Thickness<const MIN: u32 = 100, const MAX: u32 = 100_000_000>(#[serde(serialize_with = "shortest")] pub f32);
 
 impl<'de, const MIN: u32, const MAX: u32> Deserialize<'de> for Thickness<MIN, MAX> {
     fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
@@ -168,7 +175,7 @@ impl<const MIN: u32, const MAX: u32> JsonSchema for Thickness<MIN, MAX> {
 /// A diffuse albedo: 0 reflects nothing, 1 would reflect everything.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(transparent)]
-pub struct Albedo(pub f32);
+pub struct Albedo(#[serde(serialize_with = "shortest")] pub f32);
 
 impl<'de> Deserialize<'de> for Albedo {
     fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
@@ -264,4 +271,32 @@ pub fn check_name(name: &str) -> Result<(), String> {
         ));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_written_short() {
+        for (value, text) in [(0.03, "0.03"), (0.1, "0.1"), (1e-6, "1e-6"), (16_777_216.0, "16777216.0"), (0.0, "0.0")]
+        {
+            let value = Offset::<0, 1>(value);
+            assert_eq!(serde_json::to_value(value).unwrap().to_string(), text);
+            assert_eq!(serde_json::to_string(&value).unwrap(), text);
+        }
+    }
+
+    #[test]
+    fn numbers_read_back_to_the_last_bit() {
+        for bits in (0..=u32::MAX).step_by(65_537) {
+            let value = Offset::<0, 1>(f32::from_bits(bits));
+            if value.0.is_finite() {
+                let written = serde_json::to_value(value).unwrap().as_f64().unwrap();
+                assert_eq!((written as f32).to_bits(), bits);
+                let toml = toml::Value::try_from(value).unwrap().to_string();
+                assert_eq!((toml.parse::<f64>().unwrap() as f32).to_bits(), bits, "{toml}");
+            }
+        }
+    }
 }

@@ -12,11 +12,15 @@ use crate::{
     generators::Shape,
     gltf::{self, GltfTable},
     luminance,
+    mesh::has_area,
     view_table::{LookTable, MeasureTable},
 };
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-use std::path::Path;
+use serde::{
+    Deserialize, Deserializer, Serialize,
+    de::{Error, MapAccess, Visitor, value::MapAccessDeserializer},
+};
+use std::{fmt::Formatter, path::Path};
 
 /// Why a scene cannot be used. The message names the file and the line or field.
 #[derive(Debug, thiserror::Error)]
@@ -98,7 +102,9 @@ struct AoFile {
 struct ObjectFile {
     /// Unique in the scene.
     name: String,
-    /// The occluder under judgement: taken away in the twin.
+    /// The occluder under judgement: taken away in the twin. True marks every part
+    /// of the shape; banner, shelf, table and atrium mark their thin parts
+    /// themselves.
     #[serde(default)]
     occluder: bool,
     /// Grey diffuse albedo; 0.6 unless given.
@@ -108,7 +114,33 @@ struct ObjectFile {
     /// Radiance it sends out: red, green and blue.
     emission: Option<[Radiance<0, 1_000_000_000>; 3]>,
     /// What it looks like.
+    #[serde(deserialize_with = "one_shape")]
     shape: Shape,
+}
+
+/// Reads a shape, and says so where there are two.
+fn one_shape<'de, D: Deserializer<'de>>(d: D) -> Result<Shape, D::Error> {
+    struct One;
+    impl<'de> Visitor<'de> for One {
+        type Value = Shape;
+
+        fn expecting(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+            f.write_str("a table of one family, such as { curtain = {} }")
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Shape, A::Error> {
+            let shape = Shape::deserialize(MapAccessDeserializer::new(&mut map))?;
+            let Some(other) = map.next_key::<String>()? else {
+                return Ok(shape);
+            };
+            let written = serde_json::to_value(&shape).map_err(A::Error::custom)?;
+            let first = written.as_object().and_then(|s| s.keys().next()).map_or("", String::as_str);
+            Err(A::Error::custom(format_args!(
+                "a shape is of one family, not of '{first}' and '{other}': make each an object of its own"
+            )))
+        }
+    }
+    d.deserialize_map(One)
 }
 
 impl ObjectFile {
@@ -144,6 +176,11 @@ impl SceneFile {
             let material = o.material()?;
             for part in o.shape.parts().map_err(|e| named(&e))? {
                 part.mesh.validate().map_err(|e| named(&e))?;
+                // A model leaves such triangles out, so that the scene would not come back.
+                if let Some(triangle) = part.mesh.corners().position(|t| !has_area(t)) {
+                    let why = "its corners fall together or lie on one line, as far as 32-bit coordinates can tell";
+                    return Err(named(&format_args!("triangle {triangle} has no area: {why}")));
+                }
                 objects.push(Object {
                     name: if part.name.is_empty() { o.name.clone() } else { format!("{}.{}", o.name, part.name) },
                     occluder: o.occluder || part.occluder,
@@ -156,9 +193,12 @@ impl SceneFile {
         if let Some(o) = objects.iter().find(|o| model.objects.iter().any(|m| m.name == o.name)) {
             return Err(format!("an object and a part of gltf.file are both called '{}'", o.name));
         }
-        objects.extend(model.objects);
+        objects.append(&mut model.objects);
         if objects.iter().all(|o| o.occluder) {
-            return Err("the scene has no receiver: give at least one object that is not an occluder".into());
+            return Err(format!(
+                "the scene has no receiver: give at least one object that is not an occluder{}",
+                model.emptied(|_| true)
+            ));
         }
         // A lamp that is an occluder would leave the twin in the dark.
         let lamps = objects.iter().any(|o| !o.occluder && o.emissions().any(|e| luminance(e) > 0.0))

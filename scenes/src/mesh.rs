@@ -156,6 +156,11 @@ impl Mesh {
     }
 }
 
+/// Whether a triangle has a normal that single precision can tell.
+pub(crate) fn has_area([a, b, c]: [Vec3; 3]) -> bool {
+    (b - a).cross(c - a).try_normalize().is_some()
+}
+
 /// The point of a triangle that is nearest to `p` (Ericson, Real-Time Collision
 /// Detection, section 5.1.5).
 pub fn closest_point(p: Vec3, &[a, b, c]: &[Vec3; 3]) -> Vec3 {

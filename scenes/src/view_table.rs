@@ -92,13 +92,16 @@ impl LookTable {
 }
 
 fn named<'a>(cameras: &'a [Camera], name: &str) -> Result<&'a Camera, String> {
-    cameras.iter().find(|c| c.name == name).ok_or_else(|| match cameras {
-        [] => "there is no model with cameras".into(),
-        _ => {
+    let found: Vec<&Camera> = cameras.iter().filter(|c| c.name == name).collect();
+    match (found.as_slice(), cameras) {
+        ([one], _) => Ok(one),
+        ([], []) => Err("there is no model with cameras".into()),
+        ([], _) => {
             let names: Vec<&str> = cameras.iter().take(12).map(|c| c.name.as_str()).collect();
-            format!("no camera of the model has this name; there are: {}", names.join(", "))
+            Err(format!("no camera of the model has this name; there are: {}", names.join(", ")))
         }
-    })
+        (many, _) => Err(format!("{} cameras of the model have this name: give each a name of its own", many.len())),
+    }
 }
 
 /// All that `[measure]` may hold. Sorted out after reading, as errors then say

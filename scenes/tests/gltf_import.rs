@@ -337,3 +337,55 @@ fn jpeg_textures_are_decoded() {
     assert_eq!(texture.size, [8, 8]);
     assert!(texture.texels.iter().all(|t| t[3] == 255 && t[0].abs_diff(128) < 3));
 }
+
+/// A receiver, and a mesh `cloth` of which nothing is left.
+fn with_cloth(change: impl Fn(&mut Builder)) -> Builder {
+    let mut b = triangle();
+    let positions = b.positions(&SQUARE);
+    let cloth = json!({ "name": "cloth", "primitives": [{ "attributes": { "POSITION": positions }, "mode": 5 }] });
+    let mesh = b.push("meshes", cloth);
+    b.node(json!({ "name": "hanging", "mesh": mesh }));
+    change(&mut b);
+    b
+}
+
+#[test]
+fn what_has_no_triangles_left_is_told_of() {
+    let flat = with_cloth(|b| b.json["nodes"][1]["scale"] = json!([0, 0, 0]));
+    let clear = with_cloth(|b| {
+        let color = json!({ "baseColorFactor": [1, 1, 1, 0.1] });
+        b.push("materials", json!({ "name": "silk", "alphaMode": "MASK", "pbrMetallicRoughness": color }));
+        b.json["meshes"][1]["primitives"][0]["material"] = json!(0);
+    });
+    let lines = with_cloth(|b| b.json["meshes"][1]["primitives"][0]["mode"] = json!(1));
+    let left = "mesh 1 'cloth' has no triangles left (2 were cut away or degenerate)";
+    for (model, pattern, told) in [
+        (&flat, "cloth", left),
+        (&flat, "hang*", left),
+        (&clear, "silk", left),
+        (&lines, "cloth", "mesh 1 'cloth' has only points or lines"),
+    ] {
+        let told = &format!("no node, mesh or material has a name like '{pattern}' and triangles; {told}");
+        let mut read = model.import().unwrap();
+        assert_eq!(&read.mark_occluders(&[pattern]).unwrap_err(), told);
+        assert!(read.mark_occluders(&["curtain"]).unwrap_err().contains("there are, for example: 'node'"));
+    }
+    let text = format!("{SCENE}[gltf]\nfile = 'model.glb'\noccluders = ['node']\n");
+    let message = scene_of(&flat, &text).unwrap_err();
+    assert!(message.contains("no receiver") && message.ends_with(left), "{message}");
+    let all =
+        with_cloth(|b| b.json["nodes"].as_array_mut().unwrap().iter_mut().for_each(|n| n["scale"] = json!([0, 0, 0])));
+    let message = all.import().unwrap_err().to_string();
+    assert!(message.contains("it has no triangles; mesh 0 'mesh' has no triangles left (1 was"), "{message}");
+}
+
+#[test]
+fn cameras_of_one_name_are_ambiguous() {
+    let mut b = everything();
+    b.node(json!({ "name": "eye", "camera": 0 }));
+    let floor = "[gltf]\nfile = 'model.glb'\n";
+    let text = SCENE.replace("eye = [1, 1, 1], target = [0, 0, 0]", "camera = 'eye'") + floor;
+    let message = scene_of(&b, &text).unwrap_err();
+    assert!(message.contains("look.camera is 'eye', but 2 cameras of the model have this name"), "{message}");
+    assert!(scene_of(&everything(), &text).is_ok());
+}

@@ -8,12 +8,15 @@ use super::{
     document::{Document, Primitive, get, label},
     graph::{self, Placed},
     material::{Prepared, Wardrobe},
-    names::{self, Unique},
+    names::{self, Emptied, Unique},
     punctual, views,
 };
-use crate::{Mesh, Object};
+use crate::{Mesh, Object, mesh::has_area};
 use glam::{DMat3, DMat4, Vec2, Vec3};
 use std::path::Path;
+
+/// Most primitives without triangles that are remembered.
+const MOST_EMPTIED: usize = 4096;
 
 /// Reads a whole file.
 pub(super) fn read(bytes: &[u8], folder: Option<&Path>, scale: f32) -> Result<Imported, String> {
@@ -35,14 +38,9 @@ pub(super) fn read(bytes: &[u8], folder: Option<&Path>, scale: f32) -> Result<Im
     graph::walk(&document, scale, |placed| reader.visit(placed, scale))?;
     let out = reader.out;
     if out.objects.is_empty() {
-        return Err("it has no triangles".into());
+        return Err(format!("it has no triangles{}", out.emptied(|_| true)));
     }
     Ok(out)
-}
-
-/// Whether a triangle has a normal that single precision can tell.
-pub(super) fn has_area([a, b, c]: [Vec3; 3]) -> bool {
-    (b - a).cross(c - a).try_normalize().is_some()
 }
 
 struct Reader<'a> {
@@ -79,13 +77,16 @@ impl Reader<'_> {
         for (k, primitive) in def.primitives.iter().enumerate() {
             // Points and lines are no surface.
             if primitive.mode < 4 {
+                self.empty(placed, [def.name.as_deref(), None], &this, 0);
                 continue;
             }
             let this = if def.primitives.len() > 1 { format!("{this}, primitive {k}") } else { this.clone() };
             let worn = self.wardrobe.get(primitive.material, &this)?;
             let mesh = self.primitive(primitive, &worn, &this)?;
+            let triangles = mesh.triangles.len();
             let Some(mesh) = self.place(mesh, &worn, placed).map_err(|e| format!("{}, {this}: {e}", placed.label()))?
             else {
+                self.empty(placed, [def.name.as_deref(), worn.material.name.as_deref()], &this, triangles);
                 continue;
             };
             let mut name = placed.node.name.clone().or(def.name.clone()).unwrap_or(format!("node{}", placed.index));
@@ -98,6 +99,19 @@ impl Reader<'_> {
             self.out.objects.push(Object { name, occluder, material: worn.material.clone(), mesh });
         }
         Ok(())
+    }
+
+    /// Remembers a primitive that becomes no object; `also` are its mesh's and
+    /// its material's name.
+    fn empty(&mut self, placed: &Placed<'_>, also: [Option<&str>; 2], label: &str, triangles: usize) {
+        // A small file may place such a thing a great many times.
+        if self.out.emptied.len() == MOST_EMPTIED {
+            return;
+        }
+        let names = placed.names.iter().cloned().chain(also.into_iter().flatten().map(Into::into));
+        // What has no name at all is still told of.
+        let names = names.chain(std::iter::once(label.into())).collect();
+        self.out.emptied.push(Emptied { label: label.to_owned(), triangles, names });
     }
 
     /// The triangles of a primitive, where its mesh has them.

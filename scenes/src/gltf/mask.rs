@@ -5,7 +5,7 @@
 //! columns, blocks of texels are taken together by their mean alpha.
 
 use super::accessor::Budget;
-use crate::{Mesh, Texture, Wrap};
+use crate::{Mesh, Texture, Wrap, mesh::has_area};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::rc::Rc;
 
@@ -246,7 +246,7 @@ fn push_piece(out: &mut Mesh, piece: &[Point], corners: [Vec3; 3], uvs: [Vec2; 3
     }
     for k in 1..piece.len() as u32 - 1 {
         let triangle = [base, base + k, base + k + 1];
-        if super::import::has_area(triangle.map(|i| out.positions[i as usize])) {
+        if has_area(triangle.map(|i| out.positions[i as usize])) {
             out.triangles.push(triangle);
         }
     }

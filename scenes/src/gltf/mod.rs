@@ -71,6 +71,8 @@ pub struct Imported {
     pub degenerate: usize,
     /// The names each object goes by: its nodes', its mesh's, its material's.
     names: Vec<Vec<Arc<str>>>,
+    /// What is there in the file, but has no triangles left.
+    emptied: Vec<names::Emptied>,
 }
 
 /// Why a glTF file cannot be read or written. One sentence that names the file.

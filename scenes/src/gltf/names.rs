@@ -2,7 +2,10 @@
 
 use super::{Imported, document::quoted};
 use serde_json::Value;
-use std::collections::{HashMap, HashSet};
+use std::{
+    collections::{HashMap, HashSet},
+    sync::Arc,
+};
 use wildmatch::WildMatch;
 
 /// Longest name an object gets, characters.
@@ -35,6 +38,17 @@ pub(super) fn marked(extras: Option<&Value>) -> bool {
     extras.and_then(|e| e.pointer("/aogauge/occluder")) == Some(&Value::Bool(true))
 }
 
+/// A primitive that became no object.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Emptied {
+    /// What it is called in messages.
+    pub label: String,
+    /// How many triangles it had.
+    pub triangles: usize,
+    /// The names it goes by.
+    pub names: Vec<Arc<str>>,
+}
+
 impl Imported {
     /// Marks as occluders the objects whose node (or a node above it), mesh or
     /// material has a name that fits a pattern, where `*` stands for any text and
@@ -61,13 +75,29 @@ impl Imported {
             }
             if !found {
                 return Err(format!(
-                    "no node, mesh or material has a name like {}; there are, for example: {}",
+                    "no node, mesh or material has a name like {}{}",
                     quoted(pattern.as_ref()),
-                    self.some_names()
+                    match self.emptied(|n| glob.matches(n)) {
+                        none if none.is_empty() => format!("; there are, for example: {}", self.some_names()),
+                        emptied => format!(" and triangles{emptied}"),
+                    }
                 ));
             }
         }
         Ok(())
+    }
+
+    /// What has no triangles left, of that with a name that fits: a clause that
+    /// goes on with a message, empty where there is nothing to tell.
+    pub(crate) fn emptied(&self, fits: impl Fn(&str) -> bool) -> String {
+        let found: Vec<&Emptied> = self.emptied.iter().filter(|e| e.names.iter().any(|n| fits(n))).collect();
+        let each = found.iter().take(3).map(|e| match e.triangles {
+            0 => format!("; {} has only points or lines", e.label),
+            1 => format!("; {} has no triangles left (1 was cut away or degenerate)", e.label),
+            n => format!("; {} has no triangles left ({n} were cut away or degenerate)", e.label),
+        });
+        let more = found.len().checked_sub(4).map(|n| format!("; so have {} more", n + 1));
+        each.chain(more).collect()
     }
 
     fn some_names(&self) -> String {

@@ -180,6 +180,9 @@ impl Shown {
 }
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
+    if let Some(path) = args.preview.as_ref().filter(|p| p.extension() != Some("png".as_ref())) {
+        return Err(Failure::usage(format!("--preview is '{}': it must end in .png", path.display())));
+    }
     let scene = load(&args.scene)?;
     let objects = shapes(&scene);
     let shown = Shown {
