@@ -27,8 +27,9 @@ fn solid(family: &str, part: &str, text: &str) -> bool {
         ("atrium", part) => {
             ["it.curtain-", "it.banner-"].iter().any(|p| part.starts_with(p)) && thick("cloth_thickness")
         }
-        ("curtain" | "slatted-fence" | "blinds" | "leaves", _) => thick("thickness"),
-        ("banner", "it.cloth") | ("shelf", "it.board") => thick("thickness"),
+        ("curtain" | "slatted-fence" | "blinds" | "leaves", _) | ("banner", "it.cloth") | ("shelf", "it.board") => {
+            thick("thickness")
+        }
         _ => true,
     }
 }
