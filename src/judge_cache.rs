@@ -7,7 +7,7 @@
 //! version, compiler or library makes another), the scene, paths, and seed. Each
 //! file holds the replicates in order, with a hash of their pixels; a file that is
 //! broken in any way counts as none. The oldest go when all together are larger
-//! than [`MOST`].
+//! than a GiB.
 
 use crate::{
     disk::DiskError,
