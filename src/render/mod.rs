@@ -152,7 +152,7 @@ pub trait Loaded {
 pub enum RenderError {
     /// The scene is too large for its R in 32-bit floats.
     #[error(
-        "the scene reaches {magnitude} m from the centre of its measure view or the origin, but with R = {radius} m it must stay within {largest} m: beyond, rounding errors would show in openness"
+        "the scene reaches {magnitude} m from the centre of its measure view or the origin, but with R = {radius} m (ao.radius, or an estimator's own) it must stay within {largest} m: beyond, rounding errors would show in openness"
     )]
     Rounding {
         /// The largest coordinate, metres.
