@@ -59,6 +59,15 @@ pub fn tangents(n: Vec3) -> [Vec3; 2] {
     [Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), Vec3::new(b, sign + n.y * n.y * a, -n.y)]
 }
 
+/// The cosine-distributed direction about a unit normal that two numbers in [0, 1)
+/// choose, and its cosine.
+pub fn cosine_distributed(normal: Vec3, [u, v]: [f32; 2]) -> (Vec3, f32) {
+    let [cos_phi, sin_phi] = turn(v);
+    let [t, b] = tangents(normal);
+    let cosine = (1.0 - u).sqrt();
+    ((t * cos_phi + b * sin_phi) * u.sqrt() + normal * cosine, cosine)
+}
+
 /// Whether a triangle turns its front, from where its corners run
 /// counter-clockwise, against a direction.
 fn faces(corners: &[Vec3; 3], direction: Vec3) -> bool {

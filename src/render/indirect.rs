@@ -4,12 +4,7 @@
 //! and what it reflects of the same kind of light, so L is followed by one more ray
 //! at a time until Russian roulette ends it. The mean over rays is O + I.
 
-use super::{
-    Geometry, LocalIndirect,
-    ao::tangents,
-    gbuffer::Surface,
-    sampler::{Sampler, turn},
-};
+use super::{Geometry, LocalIndirect, ao::cosine_distributed, gbuffer::Surface, sampler::Sampler};
 use crate::trace::Ray;
 use aogauge_scenes::AoScale;
 use glam::{DVec3, Vec3};
@@ -47,10 +42,7 @@ fn ray(
     let mut throughput = Vec3::ONE;
     let mut sum = Vec3::ZERO;
     for bounce in 0u32.. {
-        let [u, v] = sampler.pair(index, bounce);
-        let [cos_phi, sin_phi] = turn(v);
-        let [t, b] = tangents(normal);
-        let direction = (t * cos_phi + b * sin_phi) * u.sqrt() + normal * (1.0 - u).sqrt();
+        let (direction, _) = cosine_distributed(normal, sampler.pair(index, bounce));
         let origin = point + normal * tracer.offset();
         let Some(hit) = tracer.closest(&Ray::new(origin, direction, method.falloff.reach(radius))) else {
             return sum + throughput;

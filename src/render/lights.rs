@@ -74,15 +74,20 @@ impl Lights {
     }
 
     /// A random point of a random portal, all portals alike.
-    pub fn aim_at_portal(&self, origin: Vec3, [u, v]: [f32; 2]) -> Option<Aim> {
+    pub fn aim_at_portal(&self, origin: Vec3, place: impl FnOnce() -> [f32; 2]) -> Option<Aim> {
+        if self.portals.is_empty() {
+            return None;
+        }
+        let [u, v] = place();
         let (portal, u) = pick(&self.portals, u)?;
         let to = portal.corner + portal.u * u + portal.v * v - origin;
         Some(Aim { direction: to.try_normalize()?, triangle: None })
     }
 
     /// A random point of a glowing surface, by its power.
-    pub fn aim_at_emitter(&self, origin: Vec3, [u, v]: [f32; 2]) -> Option<Aim> {
+    pub fn aim_at_emitter(&self, origin: Vec3, place: impl FnOnce() -> [f32; 2]) -> Option<Aim> {
         let total = *self.powers.last()?;
+        let [u, v] = place();
         let place = f64::from(u) * total;
         let index = self.powers.partition_point(|&p| p <= place).min(self.emitters.len() - 1);
         let before = if index == 0 { 0.0 } else { self.powers[index - 1] };
@@ -137,8 +142,11 @@ impl Lights {
 
     /// What one punctual light, picked at random, sends to a point, times their
     /// number.
-    pub fn punctual(&self, point: Vec3, u: f32) -> Option<Arrival> {
-        let (light, _) = pick(&self.punctual, u)?;
+    pub fn punctual(&self, point: Vec3, which: impl FnOnce() -> f32) -> Option<Arrival> {
+        if self.punctual.is_empty() {
+            return None;
+        }
+        let (light, _) = pick(&self.punctual, which())?;
         let arrival = arrival(light, point)?;
         Some(Arrival { irradiance: arrival.irradiance * self.punctual.len() as f32, ..arrival })
     }

@@ -10,10 +10,10 @@
 
 use super::{
     Geometry,
-    ao::tangents,
+    ao::cosine_distributed,
     gbuffer::{FAR_AWAY, GBuffer},
     lights::{Aim, lambert},
-    sampler::{Sampler, turn},
+    sampler::Sampler,
 };
 use crate::trace::{Hit, Ray};
 use aogauge_scenes::luminance;
@@ -66,19 +66,15 @@ fn path(geometry: &Geometry, point: Vec3, normal: Vec3, sampler: &Sampler, index
     for bounce in 0u32.. {
         let origin = point + normal * tracer.offset();
         let pair = |which: u32| sampler.pair(index, PAIRS * bounce + which);
-        let aims = [lights.aim_at_portal(origin, pair(0)), lights.aim_at_emitter(origin, pair(2))];
+        // Random numbers cost hashes: they are drawn where something uses them.
+        let aims = [lights.aim_at_portal(origin, || pair(0)), lights.aim_at_emitter(origin, || pair(2))];
         for aim in aims.into_iter().flatten() {
             sum += throughput * aimed(geometry, origin, normal, aim);
         }
-        let [survive, which] = pair(3);
-        if let Some(arrival) = lights.punctual(origin, which) {
+        if let Some(arrival) = lights.punctual(origin, || pair(3)[1]) {
             sum += throughput * lambert(&arrival, tracer, origin, normal);
         }
-        let [u, v] = pair(1);
-        let [cos_phi, sin_phi] = turn(v);
-        let [t, b] = tangents(normal);
-        let cosine = (1.0 - u).sqrt();
-        let direction = (t * cos_phi + b * sin_phi) * u.sqrt() + normal * cosine;
+        let (direction, cosine) = cosine_distributed(normal, pair(1));
         let hit = tracer.closest(&Ray::new(origin, direction, FAR_AWAY));
         let radiance = radiance(geometry, direction, hit.as_ref());
         if radiance != Vec3::ZERO {
@@ -99,7 +95,7 @@ fn path(geometry: &Geometry, point: Vec3, normal: Vec3, sampler: &Sampler, index
         if bounce >= SURE_BOUNCES {
             // Below 1 even for an albedo near 1, so that every path ends.
             let survival = most.min(0.95);
-            if survive >= survival {
+            if pair(3)[0] >= survival {
                 return sum;
             }
             throughput /= survival;

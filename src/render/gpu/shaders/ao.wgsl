@@ -66,6 +66,16 @@ struct Decisions {
 
 const STOPPED = -1.0;
 
+// The surface that a ray of this direction hit, its normal against the ray.
+fn met(hit: Hit, direction: vec3<f32>) -> Surface {
+    let a = corner(hit.triangle, 0u);
+    let b = corner(hit.triangle, 1u);
+    let c = corner(hit.triangle, 2u);
+    let normal = normalize(cross(b - a, c - a));
+    let point = a * hit.weights.x + b * hit.weights.y + c * hit.weights.z;
+    return Surface(point, hit.triangle, select(normal, -normal, dot(normal, direction) > 0.0), 0u);
+}
+
 @compute @workgroup_size(64)
 fn see(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= params.pixels {
@@ -79,13 +89,7 @@ fn see(@builtin(global_invocation_id) id: vec3<u32>) {
     let hit = walk(new_ray(origin, direction, FAR_AWAY), false, false);
     var surface = Surface(vec3<f32>(), MISS, vec3<f32>(), 0u);
     if hit.triangle != MISS {
-        let a = corner(hit.triangle, 0u);
-        let b = corner(hit.triangle, 1u);
-        let c = corner(hit.triangle, 2u);
-        let normal = normalize(cross(b - a, c - a));
-        surface.point = a * hit.weights.x + b * hit.weights.y + c * hit.weights.z;
-        surface.normal = select(normal, -normal, dot(normal, direction) > 0.0);
-        surface.triangle = hit.triangle;
+        surface = met(hit, direction);
     }
     surfaces[pixel] = surface;
     sums[pixel] = 0.0;

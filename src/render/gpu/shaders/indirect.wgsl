@@ -22,16 +22,15 @@ struct Path {
 }
 
 fn follow(surface: Surface, index: u32, sampler: u32) -> Path {
-    var point = surface.point;
-    var normal = surface.normal;
+    var here = surface;
     var throughput = vec3<f32>(1.0);
     var light = vec3<f32>();
     for (var bounce = 0u; bounce < ROULETTE; bounce++) {
         let place = pair(sampler, index, bounce);
         let phi = turn(place.y);
-        let frame = tangents(normal);
-        let direction = (frame[0] * phi.x + frame[1] * phi.y) * sqrt(place.x) + normal * sqrt(1.0 - place.x);
-        let hit = walk(new_ray(point + normal * params.offset, direction, params.reach), false, false);
+        let frame = tangents(here.normal);
+        let direction = (frame[0] * phi.x + frame[1] * phi.y) * sqrt(place.x) + here.normal * sqrt(1.0 - place.x);
+        let hit = walk(new_ray(here.point + here.normal * params.offset, direction, params.reach), false, false);
         if hit.triangle == MISS {
             return Path(light + throughput, true);
         }
@@ -45,12 +44,7 @@ fn follow(surface: Surface, index: u32, sampler: u32) -> Path {
             return Path(light, true);
         }
         throughput /= survival;
-        let a = corner(hit.triangle, 0u);
-        let b = corner(hit.triangle, 1u);
-        let c = corner(hit.triangle, 2u);
-        point = a * hit.weights.x + b * hit.weights.y + c * hit.weights.z;
-        normal = normalize(cross(b - a, c - a));
-        normal = select(normal, -normal, dot(normal, direction) > 0.0);
+        here = met(hit, direction);
     }
     return Path(light, false);
 }
