@@ -36,5 +36,5 @@ pub use material::{MAX_ALBEDO, Material, luminance};
 pub use mesh::{Mesh, MeshError, clip, closest_point};
 pub use scene::{AoScale, Object, Scene};
 pub use texture::{Texture, Wrap};
-pub use view::{LookView, MeasureView, View};
+pub use view::{LookView, MeasureView, View, WorldToImage};
 pub use views_json::views_json;

@@ -1,7 +1,7 @@
 //! Where a scene is measured from, and where its pictures are taken.
 
 use crate::bounded::{Angle, Count, Direction, Fine, Triple};
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -41,6 +41,53 @@ impl View {
             self.origin + self.origin_dx * x + self.origin_dy * y,
             (self.direction + self.direction_dx * x + self.direction_dy * y).normalize(),
         )
+    }
+
+    /// The way back from points to the image; None for a view that is neither
+    /// orthographic nor perspective, or has no extent.
+    pub fn world_to_image(&self) -> Option<WorldToImage> {
+        let perspective = [self.origin_dx, self.origin_dy] == [Vec3::ZERO; 2];
+        let orthographic = [self.direction_dx, self.direction_dy] == [Vec3::ZERO; 2];
+        let [dx, dy] = match (perspective, orthographic) {
+            (true, false) => [self.direction_dx, self.direction_dy],
+            (false, true) => [self.origin_dx, self.origin_dy],
+            _ => return None,
+        };
+        let to_image = Mat3::from_cols(dx, dy, self.direction).inverse();
+        to_image.is_finite().then_some(WorldToImage { origin: self.origin, to_image, perspective })
+    }
+}
+
+/// Where points appear in the image of a [`View`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WorldToImage {
+    /// The view's ray origin at the top left corner.
+    pub origin: Vec3,
+    /// Takes a point, from [`Self::origin`], to (x, y, depth), or to (x depth,
+    /// y depth, depth) where the view is perspective.
+    pub to_image: Mat3,
+    /// Whether all rays start in one point.
+    pub perspective: bool,
+}
+
+impl WorldToImage {
+    /// Column and row of a point, in pixels from the top left corner, and its
+    /// depth in multiples of the view's ray direction before that is normalised.
+    /// None for a point behind the camera.
+    ///
+    /// ```
+    /// # use aogauge_scenes::library;
+    /// let view = library::scene("curtain-open").unwrap().look.view();
+    /// let (eye, towards) = view.ray(3, 5);
+    /// let seen = view.world_to_image().unwrap().at(eye + towards * 2.0).unwrap();
+    /// assert!((seen.x - 3.5).abs() < 1e-3 && (seen.y - 5.5).abs() < 1e-3);
+    /// ```
+    pub fn at(&self, point: Vec3) -> Option<Vec3> {
+        let seen = self.to_image * (point - self.origin);
+        if seen.z <= 0.0 {
+            return None;
+        }
+        Some(if self.perspective { Vec3::new(seen.x / seen.z, seen.y / seen.z, seen.z) } else { seen })
     }
 }
 
@@ -247,6 +294,35 @@ fn unit(v: Vec3, field: &str) -> Result<Vec3, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn points_appear_where_their_rays_start() {
+        let measure = MeasureView {
+            center: Vec3::new(1.0, 0.0, 2.0),
+            normal: Vec3::Y,
+            transect: Vec3::X,
+            clearance: 0.05,
+            pixel: 0.01,
+            resolution: [32, 16],
+        };
+        let look = LookView {
+            eye: Vec3::new(2.0, 3.0, 4.0),
+            target: Vec3::new(0.3, 0.2, 0.1),
+            fov: 50.0,
+            resolution: [64, 48],
+        };
+        for view in [measure.view(), look.view()] {
+            let to_image = view.world_to_image().unwrap();
+            for (x, y) in [(0, 0), (31, 7), (5, 15)] {
+                let (origin, direction) = view.ray(x, y);
+                let seen = to_image.at(origin + direction * 1.5).unwrap();
+                assert!((seen.x - x as f32 - 0.5).abs() < 1e-3 && (seen.y - y as f32 - 0.5).abs() < 1e-3, "{seen}");
+                assert!(to_image.at(origin - direction).is_none());
+            }
+        }
+        let neither = View { origin_dx: Vec3::X, ..look.view() };
+        assert_eq!(neither.world_to_image(), None);
+    }
 
     #[test]
     fn the_measure_view_looks_down_at_its_centre() {
