@@ -53,6 +53,15 @@ pub struct Args {
     /// From where.
     #[arg(long, value_enum, default_value_t = Which::Look)]
     view: Which,
+    /// The eye of the look view in place of the scene's, metres.
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true, conflicts_with = "view")]
+    eye: Option<[f32; 3]>,
+    /// The point at the centre of the look view, metres.
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true, conflicts_with = "view")]
+    target: Option<[f32; 3]>,
+    /// Vertical field of view of the look view, 1 to 169 degrees.
+    #[arg(long, value_name = "DEGREES", value_parser = parse_fov, allow_hyphen_values = true, conflicts_with = "view")]
+    fov: Option<f32>,
     /// Pixels for each pixel of the view, each way.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=16))]
     scale: u32,
@@ -65,10 +74,10 @@ pub struct Args {
     sun: Option<[f32; 2]>,
     /// Irradiance of the sun on a surface that faces it, one number or R,G,B; five
     /// times what the ambient light gives an open surface, unless given.
-    #[arg(long, value_name = "E", value_parser = parse_light, requires = "sun")]
+    #[arg(long, value_name = "E", value_parser = parse_light, requires = "sun", allow_hyphen_values = true)]
     sun_irradiance: Option<[f32; 3]>,
     /// Ambient radiance, one number or R,G,B; that of the scene's sky unless given.
-    #[arg(long, value_name = "L", value_parser = parse_light)]
+    #[arg(long, value_name = "L", value_parser = parse_light, allow_hyphen_values = true)]
     ambient: Option<[f32; 3]>,
     /// Light is multiplied by two to this power, -30 to 30; unless given, so that
     /// the picture without AO is middle grey on the average.
@@ -112,6 +121,22 @@ fn parse_light(text: &str) -> Result<[f32; 3], String> {
         [grey] => Ok([grey; 3]),
         [r, g, b] => Ok([r, g, b]),
         _ => Err("write one number or R,G,B".into()),
+    }
+}
+
+fn parse_point(text: &str) -> Result<[f32; 3], String> {
+    match numbers(text)?[..] {
+        [x, y, z] if [x, y, z].iter().all(|v| v.abs() <= 1e6) => Ok([x, y, z]),
+        [_, _, _] => Err("a coordinate is out of range: it must be from -1000000 to 1000000 m".into()),
+        _ => Err("write X,Y,Z in metres".into()),
+    }
+}
+
+fn parse_fov(text: &str) -> Result<f32, String> {
+    match numbers(text)?[..] {
+        [fov] if (1.0..=169.0).contains(&fov) => Ok(fov),
+        [fov] => Err(format!("{fov} is out of range: it must be from 1 to 169 degrees")),
+        _ => Err("write one number of degrees".into()),
     }
 }
 
@@ -166,9 +191,12 @@ type Named = (String, Option<Estimator>);
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
     let png = is_png(&args.out)?;
     let (methods, rays) = methods(args)?;
-    let scene = load(&args.scene)?;
-    let lighting = lighting(args, &scene)?;
-    let view = args.view.of(&scene.near_origin()).finer(args.scale);
+    let mut scene = load(&args.scene)?;
+    look(args, &mut scene)?;
+    let scene = scene;
+    let near = scene.near_origin();
+    let lighting = lighting(args, &near)?;
+    let view = args.view.of(&near).finer(args.scale);
     if view.pixels() > MOST_PIXELS {
         let [w, h] = view.resolution;
         return Err(Failure::usage(format!(
@@ -176,7 +204,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
             args.scale
         )));
     }
-    let picture = composite(args, &scene, &view, &methods, rays, &lighting)?;
+    let picture = composite(args, &near, &view, &methods, rays, &lighting)?;
     // Of the picture without AO, so that it is the same for every method.
     let shown = 0..picture.depth.len();
     let seen = shown.filter(|&i| !picture.depth[i].is_nan());
@@ -210,7 +238,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
         exposure,
         seconds: picture.seconds,
         image: args.out.display().to_string(),
-        scene: scene.name,
+        scene: scene.name.clone(),
     };
     told(&composed, args.format)
 }
@@ -261,6 +289,22 @@ fn methods(args: &Args) -> Result<(Vec<Named>, u32), Failure> {
     Ok((vec![("no AO".into(), None), named(plain), named(estimator)], rays))
 }
 
+/// Moves the look view.
+fn look(args: &Args, scene: &mut Scene) -> Result<(), Failure> {
+    let look = &mut scene.look;
+    look.eye = args.eye.map_or(look.eye, Vec3::from);
+    look.target = args.target.map_or(look.target, Vec3::from);
+    look.fov = args.fov.unwrap_or(look.fov);
+    let towards = (look.target - look.eye).normalize_or_zero();
+    if towards.cross(Vec3::Y).length() < 1e-3 {
+        return Err(Failure::usage(format!(
+            "--eye {} and --target {}: the camera must not look straight up or down, nor nowhere",
+            look.eye, look.target
+        )));
+    }
+    Ok(())
+}
+
 fn lighting(args: &Args, scene: &Scene) -> Result<Lighting, Failure> {
     let sky = scene.environment.sky;
     let ambient = match args.ambient {
@@ -273,7 +317,7 @@ fn lighting(args: &Args, scene: &Scene) -> Result<Lighting, Failure> {
         }
         None => Vec3::splat(mean_radiance(sky)),
     };
-    let mut lights = scene.near_origin().lights.clone();
+    let mut lights = scene.lights.clone();
     if let Some([azimuth, elevation]) = args.sun {
         let irradiance = match args.sun_irradiance {
             Some(irradiance) => Vec3::from(irradiance),
@@ -298,9 +342,8 @@ fn composite(
     lighting: &Lighting,
 ) -> Result<Composite, Failure> {
     let fail = |e: RenderError| Failure::usage(format!("scene '{}': {e}", scene.name));
-    let scene = scene.near_origin();
-    let geometry = Geometry::new(&scene).map_err(fail)?;
-    let materials = Materials::new(&scene);
+    let geometry = Geometry::new(scene).map_err(fail)?;
+    let materials = Materials::new(scene);
     let gpu = args.method.renderer.gpu().map_err(fail)?;
     let renderer: &dyn Renderer = gpu.as_ref().map_or(&Cpu, |g| g);
     let mut loaded = renderer.load(&geometry).map_err(fail)?;

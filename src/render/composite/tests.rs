@@ -5,12 +5,12 @@ use crate::{
 };
 use std::f32::consts::{FRAC_1_PI, PI};
 
-/// A grey, rough floor seen from straight above, and what else there is.
+/// A grey, rough floor seen from above, and what else there is.
 fn scene(more: &str) -> Scene {
     let text = format!(
         "description = 'x'\nao = {{ radius = 1 }}\nenvironment = {{ radiance = 1 }}\n\
          measure = {{ center = [0, 0, 0], normal = [0, 1, 0], transect = [1, 0, 0], clearance = 3, resolution = [64, 64] }}\n\
-         look = {{ eye = [0, 4, 0.001], target = [0, 0, 0], resolution = [32, 32] }}\n\
+         look = {{ eye = [0, 4, 2], target = [0, 0, 0], resolution = [32, 32] }}\n\
          [[object]]\nname = 'floor'\nalbedo = 0.5\nshape = {{ plane = {{ center = [0, 0, 0], u = [0, 0, 9], v = [9, 0, 0] }} }}\n{more}"
     );
     Scene::from_toml("x", "x", &text, None).unwrap()
@@ -18,7 +18,7 @@ fn scene(more: &str) -> Scene {
 
 /// A quad a metre above the floor, over its half of positive x.
 const SHEET: &str =
-    "[[object]]\nname = 'sheet'\nshape = { plane = { center = [4.5, 1, 0], u = [0, 0, 9], v = [4.5, 0, 0] } }\n";
+    "[[object]]\nname = 'sheet'\nshape = { plane = { center = [4.5, 1, 0], u = [0, 0, 9], v = [9, 0, 0] } }\n";
 
 fn lamp(kind: LightKind, position: Vec3, direction: Vec3) -> Light {
     Light { name: "l".into(), kind, position, direction, color: [1.0, 0.5, 0.25], intensity: 8.0, range: None }
@@ -103,7 +103,7 @@ fn sunny(scene: &Scene) -> Lighting {
 
 #[test]
 fn openness_dims_ambient_light_alone() {
-    let scene = scene(SHEET);
+    let scene = scene(&SHEET.replace("[4.5, 1, 0]", "[4.5, 0.6, 0]"));
     let methods = [None, Some(Estimator::CLASSIC)];
     let picture = composed(&scene, &methods, 4, &sunny(&scene));
     let [plain, classic] = &picture.methods[..] else { panic!() };
@@ -118,13 +118,13 @@ fn openness_dims_ambient_light_alone() {
         }
         dimmed += u32::from(classic.ao[i] < 0.8);
     }
-    assert!(dimmed > 50, "the sheet's edge dims the floor: {dimmed}");
+    assert!(dimmed > 30, "the sheet's edge dims the floor: {dimmed}");
 }
 
 #[test]
 fn the_sky_is_seen_at_its_ambient_radiance() {
     let mut scene = scene("");
-    scene.look.target = Vec3::new(0.0, 4.0, -1.0);
+    scene.look.target = Vec3::new(0.0, 4.0, 1.0);
     scene.environment.sky = Sky::Gradient { zenith: 1.0, horizon: 0.4, ground: 0.1 };
     let picture = composed(&scene, &[None], 1, &sunny(&scene));
     let top = picture.color(0, 16);
@@ -148,12 +148,13 @@ fn samples_lie_evenly_about_the_centre() {
 
 #[test]
 fn lamps_and_their_pictures_glow() {
-    let scene = scene(
+    let mut scene = scene(
         "[[object]]\nname = 'lamp'\nemission = [4.0, 2.0, 1.0]\nshape = { plane = { center = [0, 0.5, 0], u = [0, 0, 0.3], v = [0.3, 0, 0] } }\n",
     );
+    scene.look.target = Vec3::new(0.0, 0.5, 0.0);
     let picture = composed(&scene, &[None], 1, &Lighting { lights: vec![], ..sunny(&scene) });
     let middle = 16 * 32 + 16;
     assert_eq!(picture.emission[middle], Vec3::new(4.0, 2.0, 1.0));
     assert_eq!(picture.direct[middle], Vec3::ZERO);
-    assert!(picture.depth[middle] < 3.6 && picture.normal[middle].y > 0.99);
+    assert!((picture.depth[middle] - 4.03).abs() < 0.1 && picture.normal[middle].y > 0.99);
 }
