@@ -9,6 +9,7 @@ pub mod judge_cache;
 pub mod kit;
 pub mod layers;
 pub mod metrics;
+pub mod picture;
 pub mod preview;
 pub mod record;
 pub mod render;

@@ -3,10 +3,10 @@
 use crate::{
     disk::DiskError,
     layers::{srgb, write_png},
-    render::{Geometry, RenderError, gbuffer::GBuffer, gbuffer::Surface, path},
-    scenes::{Object, Scene, Texture, View, luminance},
+    render::{Geometry, RenderError, gbuffer::GBuffer, gbuffer::Surface, materials::Materials, path},
+    scenes::{Scene, luminance},
 };
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use image::{Rgb, RgbImage};
 use std::path::Path;
 
@@ -44,7 +44,7 @@ const SKY: [Vec3; 2] = [Vec3::new(0.36, 0.52, 0.74), Vec3::new(0.80, 0.86, 0.92)
 /// Where the scene is too large for its R, or the picture cannot be written.
 pub fn write(scene: &Scene, rays: u32, path: &Path) -> Result<(), PreviewError> {
     let geometry = Geometry::new(scene).map_err(|source| PreviewError::Render { scene: scene.name.clone(), source })?;
-    let view = finer(&scene.look.view());
+    let view = scene.look.view().finer(FINE);
     let gbuffer = GBuffer::new(&geometry.tracer, &view);
     let light = path::colors(&geometry, &gbuffer, (rays / (FINE * FINE)).max(1), 1, 0);
     let levels: Vec<f32> = light.iter().map(|&c| luminance(c)).collect();
@@ -52,66 +52,14 @@ pub fn write(scene: &Scene, rays: u32, path: &Path) -> Result<(), PreviewError> 
     let light = light.into_iter().zip(levels.iter().zip(held)).map(|(color, (&level, held))| {
         if level > held { Vec3::from_array(color) * (held / level) } else { Vec3::from_array(color) }
     });
-    let paint = Paint::new(scene);
+    let materials = Materials::new(scene);
+    let color = |surface: &Surface, light: Vec3| {
+        let here = materials.at(surface);
+        here.base_color * light + here.emission
+    };
     let colors: Vec<Option<Vec3>> =
-        gbuffer.surfaces.iter().zip(light).map(|(s, light)| s.as_ref().map(|s| paint.color(s, light))).collect();
+        gbuffer.surfaces.iter().zip(light).map(|(s, light)| s.as_ref().map(|s| color(s, light))).collect();
     Ok(write_png(path, &developed(&colors, view.resolution))?)
-}
-
-/// The same view with more pixels.
-fn finer(view: &View) -> View {
-    let part = 1.0 / FINE as f32;
-    View {
-        resolution: view.resolution.map(|n| n * FINE),
-        origin_dx: view.origin_dx * part,
-        origin_dy: view.origin_dy * part,
-        direction_dx: view.direction_dx * part,
-        direction_dy: view.direction_dy * part,
-        ..*view
-    }
-}
-
-/// Which object a triangle of the scene belongs to.
-struct Paint<'a> {
-    objects: &'a [Object],
-    /// Of each object, the number of its first triangle.
-    first: Vec<usize>,
-}
-
-impl<'a> Paint<'a> {
-    fn new(scene: &'a Scene) -> Self {
-        let first = scene
-            .objects
-            .iter()
-            .scan(0, |next, o| {
-                let first = *next;
-                *next += o.mesh.triangles.len();
-                Some(first)
-            })
-            .collect();
-        Paint { objects: &scene.objects, first }
-    }
-
-    /// Linear radiance of a surface that receives `light`, irradiance over pi.
-    fn color(&self, s: &Surface, light: Vec3) -> Vec3 {
-        let triangle = s.triangle as usize;
-        let index = self.first.partition_point(|&f| f <= triangle).saturating_sub(1);
-        let object = &self.objects[index];
-        let m = &object.material;
-        let texel = m.texture.as_ref().and_then(|t| texel(t, object, triangle - self.first[index], s.point));
-        Vec3::from_array(m.base_color) * texel.unwrap_or(Vec3::ONE) * light + Vec3::from_array(m.emissive)
-    }
-}
-
-/// The linear colour of a texture at a point of a triangle.
-fn texel(texture: &Texture, object: &Object, triangle: usize, point: Vec3) -> Option<Vec3> {
-    let corners = object.mesh.triangles.get(triangle)?.map(|i| i as usize);
-    let [a, b, c] = corners.map(|i| object.mesh.positions[i]);
-    let (n, p) = ((b - a).cross(c - a), point - a);
-    let (v, w) = (p.cross(c - a).dot(n), (b - a).cross(p).dot(n));
-    let [ta, tb, tc]: [Vec2; 3] = [0, 1, 2].map(|k| object.mesh.uvs.get(corners[k]).copied().unwrap_or_default());
-    let uv = ta + ((tb - ta) * v + (tc - ta) * w) / n.length_squared();
-    Some(texture.color(uv))
 }
 
 /// Holds each point to twice the median of its neighbours: a path that was lucky
@@ -157,7 +105,6 @@ fn developed(colors: &[Option<Vec3>], [width, height]: [u32; 2]) -> RgbImage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenes::Wrap;
 
     const TEXT: &str = "description = 'x'\nao = { radius = 1 }\nenvironment = { radiance = 3 }\n\
          measure = { center = [0, 0, 0], normal = [0, 1, 0], transect = [1, 0, 0], clearance = 0.1, resolution = [16, 16] }\n\
@@ -200,20 +147,5 @@ mod tests {
                 .zip([f32::NAN, 3.0])
                 .all(|(a, b)| a.to_bits() == b.to_bits() || *a == b)
         );
-    }
-
-    #[test]
-    fn a_texture_is_read_where_it_lies() {
-        let texels = vec![[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [255, 255, 255, 255]];
-        let texture = Texture { size: [2, 2], wrap: [Wrap::Repeat; 2], texels };
-        let mut mesh = crate::scenes::Mesh::default();
-        mesh.push_quad(Vec3::ZERO, Vec3::X * 4.0, Vec3::Y * 4.0);
-        mesh.uvs = vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
-        let object = Object { name: "x".into(), occluder: false, material: Default::default(), mesh };
-        for (x, y, triangle, expected) in
-            [(3.0, 1.0, 0, Vec3::Y), (1.0, 0.5, 0, Vec3::X), (1.0, 3.0, 1, Vec3::Z), (3.5, 3.0, 0, Vec3::ONE)]
-        {
-            assert_eq!(texel(&texture, &object, triangle, Vec3::new(x, y, 0.0)), Some(expected), "{x} {y}");
-        }
     }
 }

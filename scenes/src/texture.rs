@@ -1,6 +1,6 @@
 //! Pictures on surfaces, and what a triangle sees of them on the average.
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use std::sync::LazyLock;
 
 /// How a texture goes on beyond its edges.
@@ -53,10 +53,30 @@ impl Texture {
         self.texels.get(row as usize * w as usize + column as usize).copied().unwrap_or([0, 0, 0, 255])
     }
 
-    /// The linear colour at texture coordinates, a channel 0 to 1.
+    /// The colour at texture coordinates, a channel 0 to 1: bilinear between the
+    /// centres of texels, in linear light.
     pub fn color(&self, uv: Vec2) -> Vec3 {
-        let [r, g, b, _] = self.at(uv);
-        Vec3::from_array([r, g, b].map(|byte| srgb(byte) as f32))
+        self.between(uv, srgb)
+    }
+
+    /// The same of a picture that holds shares and no colours (roughness,
+    /// metallic): its bytes are linear.
+    pub fn shares(&self, uv: Vec2) -> Vec3 {
+        self.between(uv, linear)
+    }
+
+    fn between(&self, uv: Vec2, decode: fn(u8) -> f64) -> Vec3 {
+        let [w, h] = self.size;
+        let uv = if uv.is_finite() { uv } else { Vec2::ZERO };
+        let (x, y) = (f64::from(uv.x) * f64::from(w) - 0.5, f64::from(uv.y) * f64::from(h) - 0.5);
+        let texel = |dx: f64, dy: f64| {
+            let (column, row) = (self.wrap[0].texel(x + dx, w), self.wrap[1].texel(y + dy, h));
+            let texel = self.texels.get(row as usize * w as usize + column as usize).copied().unwrap_or_default();
+            DVec3::from_array([texel[0], texel[1], texel[2]].map(decode))
+        };
+        let (s, t) = (x - x.floor(), y - y.floor());
+        let (upper, lower) = (texel(0.0, 0.0).lerp(texel(1.0, 0.0), s), texel(0.0, 1.0).lerp(texel(1.0, 1.0), s));
+        upper.lerp(lower, t).as_vec3()
     }
 
     /// Mean over the whole picture: red, green and blue, decoded by `decode`.
@@ -133,6 +153,20 @@ mod tests {
                 assert!(wrap.texel(far, 3) < 3);
             }
         }
+    }
+
+    #[test]
+    fn between_texels_light_is_linear_and_wraps() {
+        let texels = vec![[0, 0, 0, 255], [255, 188, 51, 255]];
+        let texture = |wrap| Texture { size: [2, 1], wrap: [wrap; 2], texels: texels.clone() };
+        let near = |a: Vec3, b: [f32; 3]| assert!((a - Vec3::from_array(b)).abs().max_element() < 1e-3, "{a} {b:?}");
+        let repeat = texture(Wrap::Repeat);
+        near(repeat.color(Vec2::new(0.75, 0.5)), [1.0, 0.5029, 0.0331]);
+        near(repeat.color(Vec2::new(0.5, 0.9)), [0.5, 0.2514, 0.0166]);
+        near(repeat.shares(Vec2::new(0.5, 0.5)), [0.5, 188.0 / 510.0, 0.1]);
+        near(repeat.color(Vec2::new(1.0, 0.5)), [0.5, 0.2514, 0.0166]);
+        near(texture(Wrap::Clamp).color(Vec2::new(1.0, 0.5)), [1.0, 0.5029, 0.0331]);
+        near(texture(Wrap::Clamp).color(Vec2::NAN), [0.0; 3]);
     }
 
     #[test]

@@ -43,6 +43,31 @@ impl View {
         )
     }
 
+    /// The same view with `times` the pixels, each way.
+    #[must_use]
+    pub fn finer(&self, times: u32) -> View {
+        let part = 1.0 / times as f32;
+        View {
+            resolution: self.resolution.map(|n| n * times),
+            origin_dx: self.origin_dx * part,
+            origin_dy: self.origin_dy * part,
+            direction_dx: self.direction_dx * part,
+            direction_dy: self.direction_dy * part,
+            ..*self
+        }
+    }
+
+    /// The same view with its rays through other points of the pixels: moved by
+    /// this part of a pixel from the centre, along columns and rows.
+    #[must_use]
+    pub fn moved(&self, [x, y]: [f32; 2]) -> View {
+        View {
+            origin: self.origin + self.origin_dx * x + self.origin_dy * y,
+            direction: self.direction + self.direction_dx * x + self.direction_dy * y,
+            ..*self
+        }
+    }
+
     /// The way back from points to the image; None for a view that is neither
     /// orthographic nor perspective, or has no extent.
     pub fn world_to_image(&self) -> Option<WorldToImage> {

@@ -1,5 +1,6 @@
 //! The command line: one file a verb, and what they share: exit codes.
 
+mod composite;
 mod doctor;
 mod flatland;
 mod golden;
@@ -49,6 +50,7 @@ pub struct Cli {
 enum Verb {
     Run(run::Args),
     Render(render::Args),
+    Composite(composite::Args),
     Report(report::Args),
     #[command(subcommand)]
     Golden(golden::Verb),
@@ -115,6 +117,7 @@ impl Cli {
         match self.verb {
             Verb::Run(args) => run::execute(&args),
             Verb::Render(args) => render::execute(&args),
+            Verb::Composite(args) => composite::execute(&args),
             Verb::Report(args) => report::execute(&args),
             Verb::Golden(verb) => golden::execute(&verb),
             Verb::Scene(verb) => scene::execute(&verb),

@@ -3,7 +3,7 @@
 use super::{Exit, Failure, Format, json, print, scene::load, tell};
 use crate::{
     layers::Layers,
-    render::{Estimator, Frame, Geometry, Job, Kind, RenderError, Renderer, cpu::Cpu, gpu::Gpu},
+    render::{Estimator, Frame, Geometry, Job, Kind, ReceiverPlane, RenderError, Renderer, cpu::Cpu, gpu::Gpu},
     report::picture,
     scenes::{Scene, View},
     stats::mean_variance,
@@ -28,43 +28,50 @@ pub struct Args {
     /// looking at.
     #[arg(long)]
     out: PathBuf,
-    /// The method; classic unless given.
-    #[arg(long, value_enum, conflicts_with = "preset")]
-    estimator: Option<Kind>,
-    /// A method as an engine or the paper sets it: unity-low, unity-medium,
-    /// unity-high, unreal-default, microsoft-sample, paper-4, paper-32.
-    #[arg(long)]
-    preset: Option<String>,
-    /// An option of the method as in a suite file, KEY=VALUE; may be repeated.
-    /// Keys: falloff, faces, intensity, radius, secondary_radius, receiver_plane,
-    /// secondary_rays, secondary_sides, secondary_origin.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    options: Vec<String>,
-    /// Rays, or paths, a pixel; the preset's, or 64.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=65536))]
-    rays: Option<u32>,
+    #[command(flatten)]
+    method: Method,
     /// Independent images to take the mean of.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
     replicates: u32,
-    /// Seed of all randomness.
-    #[arg(long, default_value_t = 1)]
-    seed: u32,
     /// From where.
     #[arg(long, value_enum, default_value_t)]
     view: Which,
     /// Without the occluder.
     #[arg(long)]
     twin: bool,
-    /// Who renders.
-    #[arg(long, value_enum, default_value_t)]
-    renderer: By,
     /// What is printed on standard output.
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
 
+/// A method, its rays, and who renders it: what verbs that render share.
+#[derive(Debug, clap::Args)]
+pub(super) struct Method {
+    /// The method; classic unless given.
+    #[arg(long, value_enum, conflicts_with = "preset")]
+    pub estimator: Option<Kind>,
+    /// A method as an engine or the paper sets it: unity-low, unity-medium,
+    /// unity-high, unreal-default, microsoft-sample, paper-4, paper-32.
+    #[arg(long)]
+    pub preset: Option<String>,
+    /// An option of the method as in a suite file, KEY=VALUE; may be repeated.
+    /// Keys: falloff, faces, intensity, radius, secondary_radius, receiver_plane,
+    /// secondary_rays, secondary_sides, secondary_origin.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub options: Vec<String>,
+    /// Rays, or paths, a pixel; the preset's, or 64.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=65536))]
+    rays: Option<u32>,
+    /// Seed of all randomness.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u32,
+    /// Who renders.
+    #[arg(long, value_enum, default_value_t)]
+    pub renderer: By,
+}
+
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-enum Which {
+pub(super) enum Which {
     /// The view that metrics are taken from.
     #[default]
     Measure,
@@ -73,7 +80,7 @@ enum Which {
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-enum By {
+pub(super) enum By {
     /// The CPU reference.
     #[default]
     Cpu,
@@ -99,15 +106,8 @@ struct Rendered {
 }
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
-    let is_png = match args.out.extension().and_then(|e| e.to_str()) {
-        Some("exr") => false,
-        Some("png") => true,
-        _ => {
-            return Err(Failure::usage(format!("--out is '{}': it must end in .exr or .png", args.out.display())));
-        }
-    };
-    let (estimator, own_rays) = method(args)?;
-    let rays = args.rays.or(own_rays).unwrap_or(64);
+    let is_png = is_png(&args.out)?;
+    let (estimator, rays) = args.method.build(Kind::Classic)?;
     let scene = load(&args.scene)?;
     let frames = frames(args, &scene.near_origin(), estimator, rays)?;
     let image = Mean::of(&frames);
@@ -121,10 +121,10 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
         scene_hash: scene.hash(),
         scene: scene.name,
         estimator: EstimatorFile::of(&estimator),
-        renderer: if args.renderer == By::Cpu { "cpu" } else { "gpu" }.into(),
+        renderer: args.method.renderer.name().into(),
         rays,
         replicates: args.replicates,
-        seed: args.seed,
+        seed: args.method.seed,
         resolution: image.resolution,
         mean: mean_variance(&seen).0,
         seconds: frames.iter().map(|f| f.seconds).sum(),
@@ -146,8 +146,53 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     Ok(Exit::Pass)
 }
 
-/// The method that the options describe, and the preset's number of rays.
-fn method(args: &Args) -> Result<(Estimator, Option<u32>), Failure> {
+/// Whether a picture is asked for, and not values.
+pub(super) fn is_png(out: &Path) -> Result<bool, Failure> {
+    match out.extension().and_then(|e| e.to_str()) {
+        Some("exr") => Ok(false),
+        Some("png") => Ok(true),
+        _ => Err(Failure::usage(format!("--out is '{}': it must end in .exr or .png", out.display()))),
+    }
+}
+
+impl By {
+    /// As it is called on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            By::Cpu => "cpu",
+            By::Gpu => "gpu",
+        }
+    }
+
+    /// The GPU, where it is to render.
+    pub fn gpu(self) -> Result<Option<Gpu>, RenderError> {
+        match self {
+            By::Cpu => Ok(None),
+            By::Gpu => Gpu::open().map(Some),
+        }
+    }
+}
+
+impl Which {
+    /// The view of a scene.
+    pub fn of(self, scene: &Scene) -> View {
+        match self {
+            Which::Measure => scene.measure.view(),
+            Which::Look => scene.look.view(),
+        }
+    }
+}
+
+impl Method {
+    /// The method that the options describe, `unless_given` where they name none,
+    /// and the rays a pixel.
+    pub fn build(&self, unless_given: Kind) -> Result<(Estimator, u32), Failure> {
+        let (estimator, own_rays) = method(self, unless_given)?;
+        Ok((estimator, self.rays.or(own_rays).unwrap_or(64)))
+    }
+}
+
+fn method(args: &Method, unless_given: Kind) -> Result<(Estimator, Option<u32>), Failure> {
     let mut table = toml::Table::new();
     for option in &args.options {
         let (key, value) =
@@ -176,7 +221,11 @@ fn method(args: &Args) -> Result<(Estimator, Option<u32>), Failure> {
         .map_err(|e: toml::de::Error| Failure::usage(format!("--set {}: {}", options(), e.message())))?;
     file.preset = args.preset.clone();
     if file.preset.is_none() {
-        file.kind = Some(args.estimator.unwrap_or(Kind::Classic));
+        file.kind = Some(args.estimator.unwrap_or(unless_given));
+        // Who names the method says what the paper leaves open, too.
+        if args.estimator.is_none() && unless_given == Kind::Extended {
+            file.receiver_plane.get_or_insert(ReceiverPlane::Clipped);
+        }
     }
     let (estimator, rays) = file.build().map_err(|e| Failure::usage(format!("the estimator: {e}")))?;
     Ok((estimator, rays.map(crate::suite::Rays::get)))
@@ -196,21 +245,15 @@ const OPTIONS: [&str; 9] = [
 ];
 
 fn frames(args: &Args, scene: &Scene, estimator: Estimator, rays: u32) -> Result<Vec<Frame>, Failure> {
-    let view: View = match args.view {
-        Which::Measure => scene.measure.view(),
-        Which::Look => scene.look.view(),
-    };
+    let view = args.view.of(scene);
     let fail = |e: RenderError| Failure::usage(format!("scene '{}': {e}", scene.name));
     let twin = args.twin.then(|| scene.twin());
     let geometry = Geometry::new(twin.as_ref().unwrap_or(scene)).map_err(fail)?;
-    let gpu = match args.renderer {
-        By::Cpu => None,
-        By::Gpu => Some(Gpu::open().map_err(fail)?),
-    };
+    let gpu = args.method.renderer.gpu().map_err(fail)?;
     let renderer: &dyn Renderer = gpu.as_ref().map_or(&Cpu, |g| g);
     let mut loaded = renderer.load(&geometry).map_err(fail)?;
     let frame = |replicate| {
-        let job = Job { view: &view, estimator, ao: scene.ao, rays, seed: args.seed, replicate };
+        let job = Job { view: &view, estimator, ao: scene.ao, rays, seed: args.method.seed, replicate };
         loaded.render(&job).map_err(fail)
     };
     (0..args.replicates).map(frame).collect()

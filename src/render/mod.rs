@@ -2,12 +2,15 @@
 //! ([`Renderer`]), and what comes out ([`Frame`]).
 
 pub mod ao;
+pub mod brdf;
+pub mod composite;
 pub mod cpu;
 mod estimator;
 pub mod gbuffer;
 pub mod gpu;
 mod indirect;
 pub mod lights;
+pub mod materials;
 pub mod path;
 pub mod sampler;
 

@@ -1,0 +1,6 @@
+//! From light to a picture for the eye: exposure, tone mapping, and several
+//! pictures side by side in one.
+
+pub mod lettering;
+pub mod split;
+pub mod tone;
