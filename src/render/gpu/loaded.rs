@@ -1,14 +1,14 @@
 //! A scene on the GPU, and the dispatches that render it.
 
 use super::{
-    Gpu,
-    device::{Timer, WORKGROUP},
+    Gpu, SHADER,
+    device::{Kernel, Timer, WORKGROUP},
     params::{Params, Program, Stage},
 };
 use crate::render::{Frame, Geometry, Job, Loaded, RenderError, ao::Decisions};
 use aogauge_scenes::luminance;
 use bytemuck::{Pod, Zeroable};
-use std::time::Instant;
+use std::{sync::Arc, time::Instant};
 
 /// Primary rays of one dispatch. A dispatch that runs for seconds is killed by
 /// some drivers; at these sizes a software driver (2 million rays a second) and a
@@ -36,8 +36,14 @@ struct Images {
     surfaces: wgpu::Buffer,
     sums: wgpu::Buffer,
     decisions: wgpu::Buffer,
-    see: wgpu::BindGroup,
-    shade: wgpu::BindGroup,
+    see: Bound,
+    shade: Bound,
+}
+
+/// A kernel with its buffers.
+struct Bound {
+    kernel: Arc<Kernel>,
+    group: wgpu::BindGroup,
 }
 
 /// A scene on the GPU.
@@ -70,6 +76,11 @@ impl<'a> LoadedGpu<'a> {
         })
     }
 
+    /// What rays are traced against, with the bindings that trace.wgsl gives it.
+    fn tracing(&self) -> [(u32, &wgpu::Buffer); 2] {
+        [(1, &self.nodes), (2, &self.triangles)]
+    }
+
     /// Albedo, then emission, of each triangle in leaf order.
     fn materials(&self) -> Result<wgpu::Buffer, RenderError> {
         let of = |&t: &u32| {
@@ -89,14 +100,17 @@ impl<'a> LoadedGpu<'a> {
         let surfaces = buffer("surfaces", size_of::<Surface>())?;
         let sums = buffer("sums", size_of::<f32>() * stage.channels() as usize)?;
         let decisions = buffer("decisions", size_of::<Decisions>())?;
-        let scene = [(0, &self.params), (1, &self.nodes), (2, &self.triangles), (3, &surfaces), (4, &sums)];
-        let with = |kernel, more: Option<(u32, &wgpu::Buffer)>| {
-            device.bind(kernel, &scene.into_iter().chain(more).collect::<Vec<_>>())
+        let [tree, triangles] = self.tracing();
+        let scene = [(0, &self.params), tree, triangles, (3, &surfaces), (4, &sums)];
+        let with = |entry, more: Option<(u32, &wgpu::Buffer)>| {
+            let kernel = self.gpu.kernel(SHADER, entry)?;
+            let group = device.bind(&kernel, &scene.into_iter().chain(more).collect::<Vec<_>>());
+            Ok::<_, RenderError>(Bound { kernel, group })
         };
-        let see = with(&self.gpu.see, Some((5, &decisions)));
+        let see = with("see", Some((5, &decisions)))?;
         let shade = match stage {
-            Stage::Openness => with(&self.gpu.openness, Some((5, &decisions))),
-            Stage::Indirect => with(&self.gpu.indirect, self.materials.as_ref().map(|m| (6, m))),
+            Stage::Openness => with("openness", Some((5, &decisions)))?,
+            Stage::Indirect => with("indirect", self.materials.as_ref().map(|m| (6, m)))?,
         };
         Ok(Images { pixels, stage, surfaces, sums, decisions, see, shade })
     }
@@ -112,15 +126,12 @@ impl<'a> LoadedGpu<'a> {
         };
         for (pixels, rays) in pieces(images.pixels as u32, 1, 1, self.budget()) {
             tell(pixels.clone(), rays);
-            device.run(&self.gpu.see, &images.see, pixels.len() as u32);
+            device.run(&images.see.kernel, &images.see.group, pixels.len() as u32);
         }
-        let shade = match program.stage {
-            Stage::Openness => &self.gpu.openness,
-            Stage::Indirect => &self.gpu.indirect,
-        };
         for (slot, (pixels, rays)) in (0..).zip(self.pieces(job, program)) {
             tell(pixels.clone(), rays);
-            device.run_timed(shade, &images.shade, pixels.len() as u32, timer.map(|t| (t, slot)));
+            let Bound { kernel, group } = &images.shade;
+            device.run_timed(kernel, group, pixels.len() as u32, timer.map(|t| (t, slot)));
         }
     }
 

@@ -8,8 +8,12 @@ mod params;
 use super::{Geometry, Loaded, RenderError, Renderer};
 use device::{Device, Kernel};
 use loaded::LoadedGpu;
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Mutex, PoisonError},
+};
 
-/// The shader, its stages in order.
+/// The shader of what a view sees, openness and indirect light.
 const SHADER: &str = concat!(
     include_str!("shaders/sampler.wgsl"),
     include_str!("shaders/trace.wgsl"),
@@ -20,9 +24,8 @@ const SHADER: &str = concat!(
 /// A device with its kernels.
 pub struct Gpu {
     device: Device,
-    see: Kernel,
-    openness: Kernel,
-    indirect: Kernel,
+    /// By source and entry point, those that were used.
+    kernels: Mutex<BTreeMap<(&'static str, &'static str), Arc<Kernel>>>,
 }
 
 /// The backends that aogauge computes on.
@@ -47,7 +50,7 @@ impl Gpu {
     ///
     /// # Errors
     /// [`RenderError::NoAdapter`] where there is none, [`RenderError::Device`]
-    /// where it cannot be opened or refuses the shaders.
+    /// where it cannot be opened.
     pub fn open() -> Result<Self, RenderError> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
         descriptor.backends &= backends();
@@ -65,10 +68,18 @@ impl Gpu {
     }
 
     fn on(adapter: &wgpu::Adapter) -> Result<Self, RenderError> {
-        let device = Device::open(adapter)?;
-        let kernel = |entry| device.kernel(SHADER, entry);
-        let (see, openness, indirect) = (kernel("see")?, kernel("openness")?, kernel("indirect")?);
-        Ok(Gpu { device, see, openness, indirect })
+        Ok(Gpu { device: Device::open(adapter)?, kernels: Mutex::default() })
+    }
+
+    /// An entry point of a shader, compiled when it is first used.
+    fn kernel(&self, source: &'static str, entry: &'static str) -> Result<Arc<Kernel>, RenderError> {
+        let mut kernels = self.kernels.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(kernel) = kernels.get(&(source, entry)) {
+            return Ok(kernel.clone());
+        }
+        let kernel = Arc::new(self.device.kernel(source, entry)?);
+        kernels.insert((source, entry), kernel.clone());
+        Ok(kernel)
     }
 
     /// Adapter, driver and backend, for people.
