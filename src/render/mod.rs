@@ -188,6 +188,16 @@ pub enum RenderError {
         /// Bytes allowed.
         limit: u64,
     },
+    /// The tree of a scene has more levels than the GPU's stack.
+    #[error(
+        "the scene's tree has {levels} levels, but the GPU walks at most {limit}: are thousands of its triangles in one place?"
+    )]
+    TooDeep {
+        /// Levels it has.
+        levels: usize,
+        /// Levels allowed.
+        limit: usize,
+    },
     /// The device was lost, ran out of memory or refused a command.
     #[error("the GPU failed: {0}")]
     Device(String),

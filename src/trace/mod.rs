@@ -8,9 +8,11 @@
 
 mod build;
 mod triangle;
+mod wide;
 
 pub use build::Node;
 pub use triangle::Ray;
+pub use wide::{STACK as WIDE_STACK, Wide, WideNode};
 
 use aogauge_scenes::closest_point;
 use glam::{Vec3, Vec3A};
@@ -133,15 +135,16 @@ impl Tracer {
         nearest
     }
 
-    /// The nearest triangle on the ray within `(0, tmax]`.
+    /// The nearest triangle on the ray within `(0, tmax]`; of several at one
+    /// distance the first in the scene, whatever the order of the walk.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         let mut best: Option<(f32, usize, Vec3)> = None;
-        self.walk(ray, ray.tmax, |triangle, tmax| {
-            if let Some((t, weights)) = ray.meets(&self.triangles[triangle], tmax) {
+        self.walk(ray, ray.tmax, |triangle, tmax| match ray.meets(&self.triangles[triangle], tmax) {
+            Some((t, weights)) if best.is_none_or(|b| t < b.0 || self.source[triangle] < self.source[b.1]) => {
                 best = Some((t, triangle, weights));
-                return Some(t);
+                Some(t)
             }
-            Some(tmax)
+            _ => Some(tmax),
         });
         best.map(|(t, triangle, w)| {
             let [a, b, c] = self.triangles[triangle];

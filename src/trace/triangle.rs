@@ -26,9 +26,10 @@ pub struct Ray {
 }
 
 /// 1/x, finite for every x: a ray in the plane of a box face then gives 0 * big
-/// = 0 in the slab test and not 0 * infinity = NaN.
+/// = 0 in the slab test and not 0 * infinity = NaN. Big times a coordinate must
+/// stay finite, too.
 fn bounded_reciprocal(x: f32) -> f32 {
-    if x.abs() < 1e-30 { 1e30f32.copysign(x) } else { 1.0 / x }
+    if x.abs() < 1e-20 { 1e20f32.copysign(x) } else { 1.0 / x }
 }
 
 impl Ray {

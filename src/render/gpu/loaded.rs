@@ -5,9 +5,13 @@ use super::{
     device::{Kernel, Timer, WORKGROUP},
     params::{Params, Program, Stage},
 };
-use crate::render::{Frame, Geometry, Job, Loaded, RenderError, ao::Decisions};
+use crate::{
+    render::{Frame, Geometry, Job, Loaded, RenderError, ao::Decisions},
+    trace::{WIDE_STACK, Wide},
+};
 use aogauge_scenes::luminance;
 use bytemuck::{Pod, Zeroable};
+use glam::Vec4;
 use std::{sync::Arc, time::Instant};
 
 /// Primary rays of one dispatch. A dispatch that runs for seconds is killed by
@@ -52,6 +56,8 @@ pub(super) struct LoadedGpu<'a> {
     geometry: &'a Geometry,
     nodes: wgpu::Buffer,
     triangles: wgpu::Buffer,
+    /// How each triangle of the buffer was numbered in the scene.
+    source: Vec<u32>,
     /// Albedo and emission of each triangle, once a stage asks for them.
     materials: Option<wgpu::Buffer>,
     params: wgpu::Buffer,
@@ -61,14 +67,24 @@ pub(super) struct LoadedGpu<'a> {
 impl<'a> LoadedGpu<'a> {
     pub(super) fn new(gpu: &'a Gpu, geometry: &'a Geometry) -> Result<Self, RenderError> {
         let device = &gpu.device;
-        let corners: Vec<[f32; 9]> =
-            geometry.tracer.triangles().iter().map(|[a, b, c]| [a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z]).collect();
+        let tracer = &geometry.tracer;
+        let wide = Wide::new(tracer);
+        if wide.depth > WIDE_STACK {
+            return Err(RenderError::TooDeep { levels: wide.depth, limit: WIDE_STACK });
+        }
+        let source: Vec<u32> = wide.order.iter().map(|&i| tracer.source()[i as usize]).collect();
+        let with_number = |(&leaf, &number): (&u32, &u32)| {
+            let [a, b, c] = tracer.triangles()[leaf as usize];
+            [a.extend(f32::from_bits(number)), b.extend(0.0), c.extend(0.0)]
+        };
+        let corners: Vec<[Vec4; 3]> = wide.order.iter().zip(&source).map(with_number).collect();
         device.guarded(|| {
             Ok(LoadedGpu {
                 gpu,
                 geometry,
-                nodes: device.upload("nodes", bytemuck::cast_slice(geometry.tracer.nodes()))?,
+                nodes: device.upload("nodes", bytemuck::cast_slice(&wide.nodes))?,
                 triangles: device.upload("triangles", bytemuck::cast_slice(&corners))?,
+                source,
                 materials: None,
                 params: device.uniform("params", &Params::zeroed()),
                 images: None,
@@ -87,7 +103,7 @@ impl<'a> LoadedGpu<'a> {
             let [a, e] = [self.geometry.albedo(t), self.geometry.emitted(t)];
             [a.x, a.y, a.z, e.x, e.y, e.z]
         };
-        let numbers: Vec<[f32; 6]> = self.geometry.tracer.source().iter().map(of).collect();
+        let numbers: Vec<[f32; 6]> = self.source.iter().map(of).collect();
         self.gpu.device.upload("materials", bytemuck::cast_slice(&numbers))
     }
 
@@ -171,14 +187,16 @@ impl Loaded for LoadedGpu<'_> {
                 Some(timer) => timer.seconds(&self.gpu.device)?.iter().sum(),
                 None => wall,
             };
-            let source = self.geometry.tracer.source();
             let (values, colors) = finished(&program, &sums, &surfaces, job.rays);
             Ok(Frame {
                 resolution: job.view.resolution,
                 values,
                 colors,
                 decisions: (program.stage == Stage::Openness).then_some(decisions),
-                seen: surfaces.iter().map(|s| source.get(s.triangle as usize).copied().unwrap_or(u32::MAX)).collect(),
+                seen: surfaces
+                    .iter()
+                    .map(|s| self.source.get(s.triangle as usize).copied().unwrap_or(u32::MAX))
+                    .collect(),
                 seconds,
             })
         });
