@@ -1,5 +1,6 @@
 //! aogauge judges the image quality of ambient-occlusion renderers.
 
+pub mod bench;
 pub mod cli;
 pub mod disk;
 pub mod flatland;

@@ -1,5 +1,6 @@
 //! The command line: one file a verb, and what they share: exit codes.
 
+mod bench;
 mod composite;
 mod doctor;
 mod flatland;
@@ -57,6 +58,8 @@ enum Verb {
     #[command(subcommand)]
     Scene(scene::Verb),
     Flatland(flatland::Args),
+    #[command(subcommand)]
+    Bench(bench::Verb),
     Doctor(doctor::Args),
     Schema(schema::Args),
 }
@@ -122,6 +125,7 @@ impl Cli {
             Verb::Golden(verb) => golden::execute(&verb),
             Verb::Scene(verb) => scene::execute(&verb),
             Verb::Flatland(args) => flatland::execute(&args),
+            Verb::Bench(verb) => bench::execute(&verb),
             Verb::Doctor(args) => doctor::execute(&args),
             Verb::Schema(args) => schema::execute(&args),
         }

@@ -1,6 +1,7 @@
 //! Reports: a record becomes Markdown with its pictures. Nothing here renders; a
 //! report can be made again from a record at any time.
 
+pub mod bench;
 pub mod flatland;
 mod markdown;
 pub(crate) mod picture;

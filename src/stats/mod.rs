@@ -4,9 +4,11 @@
 //! `1 - cdf`, so that small p-values keep their digits.
 
 mod jackknife;
+mod spread;
 mod tests_of_means;
 
 pub use jackknife::{Group, jackknife};
+pub use spread::Spread;
 pub(crate) use tests_of_means::welch_of_moments;
 pub use tests_of_means::{Welch, sidak_alpha, tost, welch};
 

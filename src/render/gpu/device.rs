@@ -134,12 +134,7 @@ impl Device {
         })
     }
 
-    /// Submits one dispatch.
-    pub fn run(&self, kernel: &Kernel, group: &wgpu::BindGroup, invocations: u32) {
-        self.run_timed(kernel, group, invocations, None);
-    }
-
-    /// Submits one dispatch and notes when it began and ended.
+    /// Submits one dispatch; a timer notes when it began and ended.
     pub fn run_timed(&self, kernel: &Kernel, group: &wgpu::BindGroup, invocations: u32, timer: Option<(&Timer, u64)>) {
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
@@ -162,6 +157,19 @@ impl Device {
         self.queue.submit([encoder.finish()]);
     }
 
+    /// Waits until all that was submitted has run.
+    pub fn wait(&self) -> Result<(), RenderError> {
+        self.device
+            .poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) })
+            .map_err(|e| RenderError::Device(e.to_string()))?;
+        self.check()
+    }
+
+    /// Whether dispatches can be timed by the device itself.
+    pub fn has_timestamps(&self) -> bool {
+        self.tick.is_some()
+    }
+
     /// Copies a buffer back, once all that was submitted has run.
     pub fn read<T: Pod>(&self, source: &wgpu::Buffer) -> Result<Vec<T>, RenderError> {
         let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
@@ -179,10 +187,7 @@ impl Device {
             let _ = sender.send(result);
         });
         let device_error = |e: &dyn std::fmt::Display| RenderError::Device(e.to_string());
-        self.device
-            .poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) })
-            .map_err(|e| device_error(&e))?;
-        self.check()?;
+        self.wait()?;
         match receiver.try_recv() {
             Ok(Ok(())) => {}
             Ok(Err(e)) => return Err(device_error(&e)),

@@ -34,7 +34,7 @@ struct Surface {
 }
 
 /// Buffers that depend on the number of pixels.
-struct Images {
+pub(super) struct Images {
     pixels: u64,
     stage: Stage,
     surfaces: wgpu::Buffer,
@@ -52,7 +52,7 @@ struct Bound {
 
 /// A scene on the GPU.
 pub(super) struct LoadedGpu<'a> {
-    gpu: &'a Gpu,
+    pub(super) gpu: &'a Gpu,
     geometry: &'a Geometry,
     nodes: wgpu::Buffer,
     triangles: wgpu::Buffer,
@@ -107,6 +107,20 @@ impl<'a> LoadedGpu<'a> {
         self.gpu.device.upload("materials", bytemuck::cast_slice(&numbers))
     }
 
+    /// The buffers of the job before where they fit, else new ones.
+    pub(super) fn take_images(&mut self, job: &Job<'_>, program: &Program) -> Result<Images, RenderError> {
+        let pixels = job.view.pixels() as u64;
+        match self.images.take() {
+            Some(images) if images.pixels == pixels && images.stage == program.stage => Ok(images),
+            _ => self.gpu.device.guarded(|| self.images(pixels, program.stage)),
+        }
+    }
+
+    /// Keeps buffers for the next job.
+    pub(super) fn keep_images(&mut self, images: Images) {
+        self.images = Some(images);
+    }
+
     fn images(&mut self, pixels: u64, stage: Stage) -> Result<Images, RenderError> {
         if stage == Stage::Indirect && self.materials.is_none() {
             self.materials = Some(self.materials()?);
@@ -131,27 +145,34 @@ impl<'a> LoadedGpu<'a> {
         Ok(Images { pixels, stage, surfaces, sums, decisions, see, shade })
     }
 
-    /// Sees, then shades, in pieces that are each a submission of their own. The
-    /// timer counts shading, as the CPU's clock does.
-    fn dispatch(&self, job: &Job<'_>, program: &Program, images: &Images, timer: Option<&Timer>) {
+    /// Finds what the view sees, in pieces that are each a submission of their own.
+    pub(super) fn see(&self, job: &Job<'_>, program: &Program, images: &Images, timer: Option<&Timer>) {
+        let pieces = self.see_pieces(images);
+        self.dispatch(job, program, &images.see, pieces, timer);
+    }
+
+    /// Shades what is seen, likewise.
+    pub(super) fn shade(&self, job: &Job<'_>, program: &Program, images: &Images, timer: Option<&Timer>) {
+        let pieces = self.pieces(job, program);
+        self.dispatch(job, program, &images.shade, pieces, timer);
+    }
+
+    fn dispatch(&self, job: &Job<'_>, program: &Program, bound: &Bound, pieces: Vec<Piece>, timer: Option<&Timer>) {
         let device = &self.gpu.device;
         let offset = self.geometry.tracer.offset();
-        let tell = |pixels, rays| {
+        for (slot, (pixels, rays)) in (0..).zip(pieces) {
+            let count = pixels.len() as u32;
             let params = program.params(job, offset, pixels, rays);
             device.queue.write_buffer(&self.params, 0, bytemuck::bytes_of(&params));
-        };
-        for (pixels, rays) in pieces(images.pixels as u32, 1, 1, self.budget()) {
-            tell(pixels.clone(), rays);
-            device.run(&images.see.kernel, &images.see.group, pixels.len() as u32);
-        }
-        for (slot, (pixels, rays)) in (0..).zip(self.pieces(job, program)) {
-            tell(pixels.clone(), rays);
-            let Bound { kernel, group } = &images.shade;
-            device.run_timed(kernel, group, pixels.len() as u32, timer.map(|t| (t, slot)));
+            device.run_timed(&bound.kernel, &bound.group, count, timer.map(|t| (t, slot)));
         }
     }
 
-    fn pieces(&self, job: &Job<'_>, program: &Program) -> Vec<Piece> {
+    pub(super) fn see_pieces(&self, images: &Images) -> Vec<Piece> {
+        pieces(images.pixels as u32, 1, 1, self.budget())
+    }
+
+    pub(super) fn pieces(&self, job: &Job<'_>, program: &Program) -> Vec<Piece> {
         pieces(job.view.pixels() as u32, job.rays, program.rays_an_invocation(), self.budget())
     }
 
@@ -164,16 +185,13 @@ impl Loaded for LoadedGpu<'_> {
     fn render(&mut self, job: &Job<'_>) -> Result<Frame, RenderError> {
         let program = Program::new(&job.estimator)?;
         self.geometry.suits(&job.estimator, job.ao)?;
-        let pixels = job.view.pixels() as u64;
-        let images = match self.images.take() {
-            Some(images) if images.pixels == pixels && images.stage == program.stage => images,
-            _ => self.gpu.device.guarded(|| self.images(pixels, program.stage))?,
-        };
+        let images = self.take_images(job, &program)?;
         let start = Instant::now();
         let frame = self.gpu.device.guarded(|| {
             let dispatches = self.pieces(job, &program).len() as u64;
             let timer = Timer::new(&self.gpu.device, dispatches);
-            self.dispatch(job, &program, &images, timer.as_ref());
+            self.see(job, &program, &images, None);
+            self.shade(job, &program, &images, timer.as_ref());
             let sums: Vec<f32> = self.gpu.device.read(&images.sums)?;
             let wall = start.elapsed().as_secs_f64();
             if sums.contains(&STOPPED) {
@@ -200,7 +218,7 @@ impl Loaded for LoadedGpu<'_> {
                 seconds,
             })
         });
-        self.images = Some(images);
+        self.keep_images(images);
         frame
     }
 }
@@ -220,7 +238,7 @@ fn finished(program: &Program, sums: &[f32], surfaces: &[Surface], rays: u32) ->
 }
 
 /// A range of pixels and a range of rays.
-type Piece = (std::ops::Range<u32>, std::ops::Range<u32>);
+pub(super) type Piece = (std::ops::Range<u32>, std::ops::Range<u32>);
 
 /// Splits a job so that no piece has more than `budget` rays, and no invocation
 /// more than `most`.

@@ -4,6 +4,7 @@
 mod device;
 mod loaded;
 mod params;
+mod timing;
 
 use super::{Geometry, Loaded, RenderError, Renderer};
 use device::{Device, Kernel};
@@ -12,6 +13,7 @@ use std::{
     collections::BTreeMap,
     sync::{Arc, Mutex, PoisonError},
 };
+pub use timing::{Clock, Rounds, Timed};
 
 /// The shader of what a view sees, openness and indirect light.
 const SHADER: &str = concat!(

@@ -1,0 +1,114 @@
+//! `aogauge bench`
+
+use super::{Exit, Failure, Format, json, print, run::bar, scene::load, tell};
+use crate::{
+    bench::{GpuBench, MOST_RAYS, Settings, VERSION, scene},
+    disk::write_whole,
+    render::gpu::{Gpu, Rounds},
+    report::bench as tables,
+    run::Observer,
+};
+use std::{io::Write, path::PathBuf};
+
+/// Measure how fast AO is, and what the extension costs.
+#[derive(Debug, clap::Subcommand)]
+pub enum Verb {
+    Gpu(GpuArgs),
+}
+
+/// Time classic and extended AO on the GPU, from the look view of scenes.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  aogauge bench gpu\n  aogauge bench gpu --scene atrium --scene mine.toml --out reports/gpu\n  \
+aogauge bench gpu --resolution 640x360 --rays 4 --rounds 5 --format json"
+)]
+pub struct GpuArgs {
+    /// A built-in scene by name, or a scene file; may be repeated.
+    #[arg(long = "scene", default_value = "atrium")]
+    scenes: Vec<String>,
+    /// Width and height in pixels; 1920x1080 unless given, 480x270 on a software adapter.
+    #[arg(long, value_parser = resolution)]
+    resolution: Option<[u32; 2]>,
+    /// Primary rays a pixel.
+    #[arg(long, value_delimiter = ',', default_value = "4,32",
+          value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_RAYS)))]
+    rays: Vec<u32>,
+    /// Rounds that count; 50 unless given, 10 on a software adapter.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    rounds: Option<u32>,
+    /// Rounds before them; 10 unless given, 1 on a software adapter.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    warm_up: Option<u32>,
+    /// Seed of all randomness.
+    #[arg(long, default_value_t = 1)]
+    seed: u32,
+    /// Folder for bench.json and bench.md.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// What is printed on standard output.
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+/// The largest side of a view.
+const LARGEST: u32 = 8192;
+
+/// `1920x1080`.
+fn resolution(text: &str) -> Result<[u32; 2], String> {
+    let side = |s: &str| s.parse().ok().filter(|n| (16..=LARGEST).contains(n));
+    text.split_once('x')
+        .and_then(|(w, h)| Some([side(w)?, side(h)?]))
+        .ok_or_else(|| format!("write WIDTHxHEIGHT, each from 16 to {LARGEST}"))
+}
+
+pub fn execute(verb: &Verb) -> Result<Exit, Failure> {
+    match verb {
+        Verb::Gpu(args) => gpu(args),
+    }
+}
+
+fn gpu(args: &GpuArgs) -> Result<Exit, Failure> {
+    let scenes = args.scenes.iter().map(|name| load(name)).collect::<Result<Vec<_>, _>>()?;
+    let gpu = Gpu::open().map_err(|e| Failure::usage(e.to_string()))?;
+    let usual = |hardware, software| if gpu.is_software() { software } else { hardware };
+    let rounds =
+        Rounds { warm_up: args.warm_up.unwrap_or(usual(10, 1)), counted: args.rounds.unwrap_or(usual(50, 10)) };
+    let settings = Settings {
+        resolution: args.resolution.unwrap_or_else(|| if gpu.is_software() { [480, 270] } else { [1920, 1080] }),
+        rays: args.rays.clone(),
+        rounds,
+        seed: args.seed,
+    };
+    let mut bench = GpuBench {
+        version: VERSION,
+        tool: env!("CARGO_PKG_VERSION").into(),
+        adapter: gpu.describe(),
+        is_software: gpu.is_software(),
+        clock: gpu.clock(),
+        resolution: settings.resolution,
+        warm_up: rounds.warm_up,
+        rounds: rounds.counted,
+        scenes: vec![],
+    };
+    let bar = bar();
+    let each = (rounds.warm_up + rounds.counted) as usize;
+    for (i, s) in scenes.iter().enumerate() {
+        let step = |round: u32| bar.step(i * each + round as usize, scenes.len() * each, &s.name);
+        step(0);
+        let measured = scene(&gpu, s, &settings, step);
+        bench.scenes.push(measured.map_err(|e| Failure::usage(format!("scene '{}': {e}", s.name)))?);
+    }
+    drop(bar);
+    if let Some(folder) = &args.out {
+        for (name, text) in [("bench.json", json(&bench)?), ("bench.md", tables::markdown(&bench))] {
+            let path = folder.join(name);
+            write_whole(&path, |buffer| buffer.write_all(text.as_bytes()))?;
+            tell(&path.display().to_string());
+        }
+    }
+    match args.format {
+        Format::Json => print(&json(&bench)?)?,
+        Format::Text => print(&tables::plain(&bench))?,
+    }
+    Ok(Exit::Pass)
+}

@@ -1,0 +1,84 @@
+//! What `aogauge bench` measured, as tables.
+
+use crate::{
+    bench::{GpuBench, MethodBench, SceneBench},
+    render::gpu::Clock,
+    stats::Spread,
+};
+use std::fmt::Write as _;
+
+/// Median and quartiles.
+fn spread(s: &Spread) -> String {
+    format!("{:.3} [{:.3}, {:.3}]", s.median, s.lower, s.upper)
+}
+
+fn conditions(bench: &GpuBench) -> String {
+    let clock = match bench.clock {
+        Clock::TimestampQueries => "timestamp queries",
+        Clock::WallClock => "the CPU's clock, for want of timestamp queries",
+    };
+    format!(
+        "{}{}\n{} x {}, median [quartiles] of {} rounds by {clock}, after {} to warm up",
+        bench.adapter,
+        if bench.is_software { ", a software adapter" } else { "" },
+        bench.resolution[0],
+        bench.resolution[1],
+        bench.rounds,
+        bench.warm_up
+    )
+}
+
+fn title(scene: &SceneBench) -> String {
+    format!(
+        "{}: {} triangles, R = {} m, R' = {} m, {} pixels see a surface",
+        scene.name, scene.triangles, scene.radius, scene.secondary_radius, scene.pixels
+    )
+}
+
+/// A row's numbers: ms, ms more, millions of rays a second of all and of the
+/// secondary kind.
+fn cells(m: &MethodBench) -> [String; 4] {
+    [
+        spread(&m.ms),
+        m.extra_ms.as_ref().map_or_else(String::new, spread),
+        format!("{:.1}", m.million_rays_a_second),
+        m.million_secondary_rays_a_second.map_or_else(String::new, |r| format!("{r:.1}")),
+    ]
+}
+
+/// For the terminal.
+pub fn plain(bench: &GpuBench) -> String {
+    let mut text = conditions(bench) + "\n";
+    for scene in &bench.scenes {
+        let _ = writeln!(text, "\n{}\n", title(scene));
+        let _ = writeln!(
+            text,
+            "{:18} {:>4}  {:>26}  {:>26}  {:>8}  {:>9}",
+            "", "rays", "ms", "extra ms", "Mrays/s", "secondary"
+        );
+        let _ = writeln!(text, "{:18} {:>4}  {:>26}", "G-buffer", 1, spread(&scene.g_buffer_ms));
+        for m in &scene.methods {
+            let [ms, extra, all, secondary] = cells(m);
+            let _ = writeln!(text, "{:18} {:>4}  {ms:>26}  {extra:>26}  {all:>8}  {secondary:>9}", m.method, m.rays);
+        }
+    }
+    text
+}
+
+/// For a page.
+pub fn markdown(bench: &GpuBench) -> String {
+    let mut text = format!("# AO on the GPU\n\n{}.\n", conditions(bench).replace('\n', ": "));
+    for scene in &bench.scenes {
+        let _ = writeln!(text, "\n## {}\n\n{}.\n", scene.name, title(scene));
+        text +=
+            "| | rays a pixel | ms | ms more than classic | million rays/s, all kinds | million secondary rays/s |\n";
+        text += "|---|--:|--:|--:|--:|--:|\n";
+        let _ = writeln!(text, "| G-buffer | 1 | {} | | | |", spread(&scene.g_buffer_ms));
+        for m in &scene.methods {
+            let [ms, extra, all, secondary] = cells(m);
+            let _ = writeln!(text, "| {} | {} | {ms} | {extra} | {all} | {secondary} |", m.method, m.rays);
+        }
+    }
+    text + "\nA secondary ray is cast, twice, for each primary ray that is open; what it costs is the difference to \
+classic in the same round.\n"
+}
