@@ -6,7 +6,7 @@
 use aogauge::{
     render::{
         Estimator, Extension, Faces, Falloff, Frame, Geometry, Job, LocalIndirect, Openness, ReceiverPlane, Renderer,
-        Scale, SecondaryOrigin, Sides, cpu::Cpu, gpu::Gpu,
+        Scale, SecondaryOrigin, Sides, cpu::Cpu, gpu::Checks, gpu::Gpu,
     },
     scenes::{AoScale, Scene, View, library},
 };
@@ -201,6 +201,26 @@ fn large_views_are_split() {
     let off =
         on_cpu.values.iter().zip(&on_gpu.values).filter(|(a, b)| a.to_bits() != b.to_bits() && !a.is_nan()).count();
     assert!(off * 1000 < on_cpu.values.len(), "{off} of {} pixels", on_cpu.values.len());
+}
+
+/// Shaders run without checks of indices and loops; with them they find the same.
+#[test]
+fn checks_change_nothing() {
+    let scene = library::scene("atrium").unwrap();
+    let geometry = Geometry::new(&scene).unwrap();
+    let view = View { resolution: [101, 53], ..scene.look.view() };
+    let step = Openness { faces: Faces::Front, ..Openness::plain(Falloff::Step) };
+    let falloff = Falloff::LinearTail { tail: 0.6 };
+    let indirect = Estimator::LocalIndirect(LocalIndirect { falloff, scale: Scale::default() });
+    let images = [Checks::On, Checks::Off].map(|checks| {
+        let gpu = Gpu::open_with(checks).unwrap();
+        let mut loaded = gpu.load(&geometry).unwrap();
+        [ESTIMATORS[0], ESTIMATORS[1], ESTIMATORS[2], Estimator::Openness(step), indirect].map(|estimator| {
+            let job = Job { view: &view, estimator, ao: scene.ao, rays: 4, seed: 3, replicate: 0 };
+            loaded.render(&job).unwrap().values.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
+        })
+    });
+    assert_eq!(images[0], images[1]);
 }
 
 /// Same adapter, same job, same bits; and a change of view size in between.

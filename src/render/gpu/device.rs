@@ -18,12 +18,23 @@ const PATIENCE: Duration = Duration::from_secs(120);
 /// An opened adapter.
 pub(super) struct Device {
     pub info: wgpu::AdapterInfo,
+    checks: Checks,
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
     /// Nanoseconds a tick, where the device has timestamp queries.
     tick: Option<f32>,
     /// What went wrong outside an error scope: a lost device, a driver's refusal.
     trouble: Arc<Mutex<Option<String>>>,
+}
+
+/// Whether shaders check every index and bound every loop at run time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Checks {
+    /// They do: for tests.
+    On,
+    /// They do not: some drivers take a sixth longer with them.
+    #[default]
+    Off,
 }
 
 /// An entry point of a shader that runs on workgroups of [`WORKGROUP`] threads.
@@ -33,7 +44,7 @@ pub(super) struct Kernel {
 
 impl Device {
     /// Opens an adapter with the largest buffers it has.
-    pub fn open(adapter: &wgpu::Adapter) -> Result<Self, RenderError> {
+    pub fn open(adapter: &wgpu::Adapter, checks: Checks) -> Result<Self, RenderError> {
         let has = adapter.limits();
         let required_limits = wgpu::Limits {
             max_storage_buffer_binding_size: has.max_storage_buffer_binding_size,
@@ -64,7 +75,7 @@ impl Device {
             }
         });
         let tick = (!timestamps.is_empty()).then(|| queue.get_timestamp_period());
-        Ok(Device { info: adapter.get_info(), device, queue, tick, trouble })
+        Ok(Device { info: adapter.get_info(), checks, device, queue, tick, trouble })
     }
 
     /// Whether the adapter computes on the CPU, as Mesa's software driver does.
@@ -75,10 +86,19 @@ impl Device {
     /// Compiles an entry point of some WGSL. Its buffers are all in group 0.
     pub fn kernel(&self, source: &str, entry: &str) -> Result<Kernel, RenderError> {
         self.guarded(|| {
-            let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some(entry),
-                source: wgpu::ShaderSource::Wgsl(source.into()),
-            });
+            let descriptor =
+                wgpu::ShaderModuleDescriptor { label: Some(entry), source: wgpu::ShaderSource::Wgsl(source.into()) };
+            let module = match self.checks {
+                Checks::On => self.device.create_shader_module(descriptor),
+                // SAFETY: all indices of our shaders come from what this program
+                // uploads (nodes and triangles of one tree, pixels of images that are
+                // as large as the dispatch says), and loops end with the tree, whose
+                // depth is checked against the stack. Tested by `checks_change_nothing`
+                // in tests/gpu.rs, which renders the same with every check on.
+                Checks::Off => unsafe {
+                    self.device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked())
+                },
+            };
             let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some(entry),
                 layout: None,

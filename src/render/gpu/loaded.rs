@@ -3,7 +3,7 @@
 use super::{
     Gpu, SHADER,
     device::{Kernel, Timer, WORKGROUP},
-    params::{Params, Program, Stage},
+    params::{Params, Program, Stage, places},
 };
 use crate::{
     render::{Frame, Geometry, Job, Loaded, RenderError, ao::Decisions},
@@ -147,7 +147,7 @@ impl<'a> LoadedGpu<'a> {
 
     /// Finds what the view sees, in pieces that are each a submission of their own.
     pub(super) fn see(&self, job: &Job<'_>, program: &Program, images: &Images, timer: Option<&Timer>) {
-        let pieces = self.see_pieces(images);
+        let pieces = self.see_pieces(job);
         self.dispatch(job, program, &images.see, pieces, timer);
     }
 
@@ -160,20 +160,20 @@ impl<'a> LoadedGpu<'a> {
     fn dispatch(&self, job: &Job<'_>, program: &Program, bound: &Bound, pieces: Vec<Piece>, timer: Option<&Timer>) {
         let device = &self.gpu.device;
         let offset = self.geometry.tracer.offset();
-        for (slot, (pixels, rays)) in (0..).zip(pieces) {
-            let count = pixels.len() as u32;
-            let params = program.params(job, offset, pixels, rays);
+        for (slot, (places, rays)) in (0..).zip(pieces) {
+            let count = places.len() as u32;
+            let params = program.params(job, offset, places, rays);
             device.queue.write_buffer(&self.params, 0, bytemuck::bytes_of(&params));
             device.run_timed(&bound.kernel, &bound.group, count, timer.map(|t| (t, slot)));
         }
     }
 
-    pub(super) fn see_pieces(&self, images: &Images) -> Vec<Piece> {
-        pieces(images.pixels as u32, 1, 1, self.budget())
+    pub(super) fn see_pieces(&self, job: &Job<'_>) -> Vec<Piece> {
+        pieces(places(job.view.resolution), 1, 1, self.budget())
     }
 
     pub(super) fn pieces(&self, job: &Job<'_>, program: &Program) -> Vec<Piece> {
-        pieces(job.view.pixels() as u32, job.rays, program.rays_an_invocation(), self.budget())
+        pieces(places(job.view.resolution), job.rays, program.rays_an_invocation(), self.budget())
     }
 
     fn budget(&self) -> u64 {
@@ -237,20 +237,21 @@ fn finished(program: &Program, sums: &[f32], surfaces: &[Surface], rays: u32) ->
     (colors.iter().map(|&c| luminance(c)).collect(), Some(colors))
 }
 
-/// A range of pixels and a range of rays.
+/// A range of places in tile order and a range of rays.
 pub(super) type Piece = (std::ops::Range<u32>, std::ops::Range<u32>);
 
 /// Splits a job so that no piece has more than `budget` rays, and no invocation
 /// more than `most`.
-fn pieces(pixels: u32, rays: u32, most: u32, budget: u64) -> Vec<Piece> {
+fn pieces(places: u32, rays: u32, most: u32, budget: u64) -> Vec<Piece> {
     let ray_step = rays.clamp(1, most);
-    // At most 65,535 workgroups a dispatch.
-    let pixel_step = (budget / u64::from(ray_step)).clamp(u64::from(WORKGROUP), 65_535 * u64::from(WORKGROUP)) as u32;
+    // Whole workgroups, at most 65,535 a dispatch.
+    let groups = (budget / u64::from(ray_step * WORKGROUP)).clamp(1, 65_535) as u32;
+    let place_step = groups * WORKGROUP;
     let mut pieces = Vec::new();
     for first_ray in (0..rays).step_by(ray_step as usize) {
-        for first_pixel in (0..pixels).step_by(pixel_step as usize) {
+        for first_place in (0..places).step_by(place_step as usize) {
             pieces.push((
-                first_pixel..pixels.min(first_pixel.saturating_add(pixel_step)),
+                first_place..places.min(first_place.saturating_add(place_step)),
                 first_ray..rays.min(first_ray.saturating_add(ray_step)),
             ));
         }
@@ -264,12 +265,12 @@ mod tests {
 
     #[test]
     fn pieces_cover_every_ray_of_every_pixel_once() {
-        for (pixels, rays, budget) in
+        for (places, rays, budget) in
             [(1u32, 1u32, 64u64), (6656, 32, 1 << 19), (6656, 512, 1 << 14), (100, 70_000, 1 << 19)]
         {
-            let pieces = pieces(pixels, rays, 32, budget);
+            let pieces = pieces(places, rays, 32, budget);
             let total: u64 = pieces.iter().map(|(p, r)| p.len() as u64 * r.len() as u64).sum();
-            assert_eq!(total, u64::from(pixels) * u64::from(rays));
+            assert_eq!(total, u64::from(places) * u64::from(rays));
             for (p, r) in &pieces {
                 assert!(p.len() as u64 * r.len() as u64 <= budget.max(u64::from(WORKGROUP * 32)));
                 assert!(r.len() as u32 <= 32);

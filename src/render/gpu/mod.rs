@@ -7,6 +7,7 @@ mod params;
 mod timing;
 
 use super::{Geometry, Loaded, RenderError, Renderer};
+pub use device::Checks;
 use device::{Device, Kernel};
 use loaded::LoadedGpu;
 use std::{
@@ -19,6 +20,7 @@ pub use timing::{Clock, Rounds, Timed};
 const SHADER: &str = concat!(
     include_str!("shaders/sampler.wgsl"),
     include_str!("shaders/trace.wgsl"),
+    include_str!("shaders/survey.wgsl"),
     include_str!("shaders/ao.wgsl"),
     include_str!("shaders/indirect.wgsl")
 );
@@ -54,6 +56,14 @@ impl Gpu {
     /// [`RenderError::NoAdapter`] where there is none, [`RenderError::Device`]
     /// where it cannot be opened.
     pub fn open() -> Result<Self, RenderError> {
+        Self::open_with(Checks::default())
+    }
+
+    /// The same, with shaders that check what they do at run time, or do not.
+    ///
+    /// # Errors
+    /// As [`Gpu::open`].
+    pub fn open_with(checks: Checks) -> Result<Self, RenderError> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
         descriptor.backends &= backends();
         let backends = descriptor.backends;
@@ -66,11 +76,11 @@ impl Gpu {
                     .into(),
             )
         })?;
-        Self::on(&adapter)
+        Self::on(&adapter, checks)
     }
 
-    fn on(adapter: &wgpu::Adapter) -> Result<Self, RenderError> {
-        Ok(Gpu { device: Device::open(adapter)?, kernels: Mutex::default() })
+    fn on(adapter: &wgpu::Adapter, checks: Checks) -> Result<Self, RenderError> {
+        Ok(Gpu { device: Device::open(adapter, checks)?, kernels: Mutex::default() })
     }
 
     /// An entry point of a shader, compiled when it is first used.

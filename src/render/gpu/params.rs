@@ -1,4 +1,4 @@
-//! What a dispatch is told: view, method, which pixels and rays.
+//! What a dispatch is told: view, method, which places and rays.
 
 use crate::render::{Estimator, Faces, Falloff, Job, Openness, ReceiverPlane, RenderError, SecondaryOrigin, Sides};
 use aogauge_scenes::View;
@@ -12,9 +12,9 @@ pub(super) struct Params {
     origin: [f32; 3],
     width: u32,
     origin_dx: [f32; 3],
-    first_pixel: u32,
+    first_place: u32,
     origin_dy: [f32; 3],
-    pub pixels: u32,
+    places: u32,
     direction: [f32; 3],
     first_ray: u32,
     direction_dx: [f32; 3],
@@ -31,7 +31,8 @@ pub(super) struct Params {
     falloff_numbers: [f32; 3],
     options: u32,
     secondary_rays: u32,
-    unused_too: [u32; 3],
+    height: u32,
+    unused_too: [u32; 2],
 }
 
 /// What the GPU computes of an estimator.
@@ -60,6 +61,11 @@ impl Stage {
             Stage::Indirect => 3,
         }
     }
+}
+
+/// Places of an image in tile order: those of whole tiles of 8 x 8 pixels.
+pub(super) fn places([width, height]: [u32; 2]) -> u32 {
+    width.div_ceil(8) * height.div_ceil(8) * 64
 }
 
 /// Rays of all kinds that one invocation traces at most. Mesa's software driver
@@ -98,9 +104,9 @@ impl Program {
         }
     }
 
-    /// What the dispatch over some pixels and rays of a job is told; `offset` is
+    /// What the dispatch over some places and rays of a job is told; `offset` is
     /// how far ray origins are pushed off surfaces.
-    pub fn params(&self, job: &Job<'_>, offset: f32, pixels: Range<u32>, rays: Range<u32>) -> Params {
+    pub fn params(&self, job: &Job<'_>, offset: f32, places: Range<u32>, rays: Range<u32>) -> Params {
         let ao = self.method.scale.on(job.ao);
         let (falloff, falloff_numbers) = numbers(self.method.falloff);
         let View { resolution, origin, origin_dx, origin_dy, direction, direction_dx, direction_dy } = *job.view;
@@ -108,9 +114,9 @@ impl Program {
             origin: origin.to_array(),
             width: resolution[0],
             origin_dx: origin_dx.to_array(),
-            first_pixel: pixels.start,
+            first_place: places.start,
             origin_dy: origin_dy.to_array(),
-            pixels: pixels.len() as u32,
+            places: places.len() as u32,
             direction: direction.to_array(),
             first_ray: rays.start,
             direction_dx: direction_dx.to_array(),
@@ -127,7 +133,8 @@ impl Program {
             falloff_numbers,
             options: options(&self.method),
             secondary_rays: self.method.extension.map_or(0, |e| e.secondary_rays),
-            unused_too: [0; 3],
+            height: resolution[1],
+            unused_too: [0; 2],
         }
     }
 }

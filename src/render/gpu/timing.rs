@@ -97,7 +97,7 @@ impl LoadedGpu<'_> {
         let program = Program::new(&job.estimator)?;
         let images = self.take_images(job, &program)?;
         let seconds = self.gpu.device.guarded(|| {
-            let see = self.clocked(self.see_pieces(&images).len(), |timer| self.see(job, &program, &images, timer))?;
+            let see = self.clocked(self.see_pieces(job).len(), |timer| self.see(job, &program, &images, timer))?;
             let shade =
                 self.clocked(self.pieces(job, &program).len(), |timer| self.shade(job, &program, &images, timer))?;
             Ok([see, shade])

@@ -5,10 +5,11 @@ struct Params {
     origin: vec3<f32>,
     width: u32,
     origin_dx: vec3<f32>,
-    first_pixel: u32,
+    // The first place of this dispatch: see `pixel_of`.
+    first_place: u32,
     origin_dy: vec3<f32>,
-    // Pixels of this dispatch.
-    pixels: u32,
+    // Places of this dispatch.
+    places: u32,
     direction: vec3<f32>,
     first_ray: u32,
     direction_dx: vec3<f32>,
@@ -29,6 +30,7 @@ struct Params {
     options: u32,
     // 0 for methods without.
     secondary_rays: u32,
+    height: u32,
 }
 
 const STEP = 0u;
@@ -41,6 +43,20 @@ const CLIPPED = 2u;
 const ONE_SIDED = 4u;
 const JITTERED = 8u;
 const TURNED = 16u;
+
+// The pixel of a place in tile order, MISS for one beyond the image's edge: tiles of
+// 8 x 8 pixels, one a workgroup, along a Z curve, so that rays that run together
+// start together.
+fn pixel_of(invocation: u32) -> u32 {
+    let place = params.first_place + invocation;
+    let tile = place / 64u;
+    let along = place % 64u;
+    let across = (params.width + 7u) / 8u;
+    let x = tile % across * 8u + ((along & 1u) | ((along >> 1u) & 2u) | ((along >> 2u) & 4u));
+    let y = tile / across * 8u + (((along >> 1u) & 1u) | ((along >> 2u) & 2u) | ((along >> 3u) & 4u));
+    let inside = invocation < params.places && x < params.width && y < params.height;
+    return select(MISS, y * params.width + x, inside);
+}
 
 fn is_set(option: u32) -> bool {
     return (params.options & option) != 0u;
@@ -78,10 +94,10 @@ fn met(hit: Hit, direction: vec3<f32>) -> Surface {
 
 @compute @workgroup_size(64)
 fn see(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= params.pixels {
+    let pixel = pixel_of(id.x);
+    if pixel == MISS {
         return;
     }
-    let pixel = params.first_pixel + id.x;
     let x = f32(pixel % params.width) + 0.5;
     let y = f32(pixel / params.width) + 0.5;
     let origin = params.origin + params.origin_dx * x + params.origin_dy * y;
@@ -128,9 +144,9 @@ struct Primary {
     length: f32,
 }
 
-fn primary(origin: vec3<f32>, w: vec3<f32>) -> Primary {
+fn primary(root: u32, origin: vec3<f32>, w: vec3<f32>) -> Primary {
     let ray = new_ray(origin, w, params.reach);
-    let hit = walk(ray, params.falloff == STEP, is_set(FRONT));
+    let hit = walk_from(root, ray, params.falloff == STEP, is_set(FRONT));
     if hit.triangle == MISS {
         return Primary(false, 1.0, params.radius);
     }
@@ -146,7 +162,7 @@ struct Fan {
     d2: vec3<f32>,
 }
 
-fn closed(fan: Fan, i: u32, turned: f32) -> bool {
+fn closed(root: u32, fan: Fan, i: u32, turned: f32) -> bool {
     let period = select(0.5, 1.0, is_set(ONE_SIDED));
     let shift = select(0.0, turned, is_set(TURNED));
     let at = turn((f32(i) + shift) * period / f32(params.secondary_rays));
@@ -159,10 +175,10 @@ fn closed(fan: Fan, i: u32, turned: f32) -> bool {
     }
     let back = select(reach, 0.0, is_set(ONE_SIDED));
     if is_set(FRONT) {
-        return occluded(new_ray(fan.middle, d, forth), true)
-            || (back > 0.0 && occluded(new_ray(fan.middle, -d, back), true));
+        return occluded(root, new_ray(fan.middle, d, forth), true)
+            || (back > 0.0 && occluded(root, new_ray(fan.middle, -d, back), true));
     }
-    return occluded(new_ray(fan.middle - d * back, d, back + forth), false);
+    return occluded(root, new_ray(fan.middle - d * back, d, back + forth), false);
 }
 
 struct Decided {
@@ -171,13 +187,13 @@ struct Decided {
     closed: u32,
 }
 
-fn decide(origin: vec3<f32>, normal: vec3<f32>, t: vec3<f32>, b: vec3<f32>, place: vec2<f32>, shift: vec2<f32>) -> Decided {
+fn decide(root: u32, origin: vec3<f32>, normal: vec3<f32>, t: vec3<f32>, b: vec3<f32>, place: vec2<f32>, shift: vec2<f32>) -> Decided {
     let phi = turn(place.y);
     let sin_theta = sqrt(place.x);
     let cos_theta = sqrt(1.0 - place.x);
     let along = t * phi.x + b * phi.y;
     let w = along * sin_theta + normal * cos_theta;
-    let first = primary(origin, w);
+    let first = primary(root, origin, w);
     var decided = Decided(first.hit, first.mu, 0u);
     if first.mu > 0.0 && params.secondary_rays > 0u {
         let share = select(0.5, shift.x, is_set(JITTERED));
@@ -189,24 +205,42 @@ fn decide(origin: vec3<f32>, normal: vec3<f32>, t: vec3<f32>, b: vec3<f32>, plac
             along * cos_theta - normal * sin_theta,
         );
         for (var i = 0u; i < params.secondary_rays; i++) {
-            decided.closed |= select(0u, 1u << i, closed(fan, i, shift.y));
+            decided.closed |= select(0u, 1u << i, closed(root, fan, i, shift.y));
         }
     }
     return decided;
 }
 
+// Where all rays of a point stay. A secondary ray lies within R' of the middle of
+// its primary, and at right angles to it. What lies lower than its origin by a
+// quarter of the offset lies in truth under it, and upward rays meet none of that;
+// secondary rays that the receiver closes do.
+fn surroundings(origin: vec3<f32>, normal: vec3<f32>) -> Surroundings {
+    let has_secondary = params.secondary_rays > 0u;
+    let share = select(0.5, 1.0, is_set(JITTERED));
+    let around = select(0.0, length(vec2<f32>(share * params.radius, params.secondary_radius)), has_secondary);
+    let radius = max(params.reach, around) * 1.00001;
+    let downward = has_secondary && !is_set(CLIPPED);
+    return Surroundings(origin, radius, normal, select(-0.25 * params.offset, -FAR_AWAY, downward));
+}
+
 @compute @workgroup_size(64)
 fn openness(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= params.pixels {
+    let pixel = pixel_of(id.x);
+    if pixel == MISS {
         return;
     }
-    let pixel = params.first_pixel + id.x;
     let surface = surfaces[pixel];
     if surface.triangle == MISS {
         return;
     }
     let origin = surface.point + surface.normal * params.offset;
     let frame = tangents(surface.normal);
+    let root = survey(surroundings(origin, surface.normal));
+    if root == MISS {
+        sums[pixel] += f32(params.rays) * f32(max(params.secondary_rays, 1u));
+        return;
+    }
     let sampler = sampler_seed(params.seed, pixel, params.replicate);
     let chance = (params.options & (JITTERED | TURNED)) != 0u;
     var sum = 0.0;
@@ -217,7 +251,7 @@ fn openness(@builtin(global_invocation_id) id: vec3<u32>) {
         if chance {
             shift = pair(sampler, i, 1u);
         }
-        let decided = decide(origin, surface.normal, frame[0], frame[1], pair(sampler, i, 0u), shift);
+        let decided = decide(root, origin, surface.normal, frame[0], frame[1], pair(sampler, i, 0u), shift);
         // In units of one secondary ray, so that without falloff the sum is exact.
         let units = select(1.0, f32(params.secondary_rays - countOneBits(decided.closed)), params.secondary_rays > 0u);
         sum += decided.mu * units;

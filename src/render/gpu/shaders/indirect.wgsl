@@ -51,10 +51,10 @@ fn follow(surface: Surface, index: u32, sampler: u32) -> Path {
 
 @compute @workgroup_size(64)
 fn indirect(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= params.pixels {
+    let pixel = pixel_of(id.x);
+    if pixel == MISS {
         return;
     }
-    let pixel = params.first_pixel + id.x;
     let surface = surfaces[pixel];
     if surface.triangle == MISS {
         return;

@@ -10,6 +10,7 @@
 const STACK = 24u;
 const FAR_AWAY = 1e30;
 const MISS = 0xffffffffu;
+const ROOT = 0u;
 
 struct Ray {
     origin: vec3<f32>,
@@ -151,13 +152,18 @@ fn is_closer(meeting: Meeting, triangle: u32, best: Hit) -> bool {
 // The nearest triangle on the ray, or with `any` the first one found; with
 // `front` only of those that face it.
 fn walk(ray: Ray, any: bool, front: bool) -> Hit {
+    return walk_from(ROOT, ray, any, front);
+}
+
+// The same for a ray that meets nothing outside a subtree.
+fn walk_from(root: u32, ray: Ray, any: bool, front: bool) -> Hit {
     var best = Hit(MISS, ray.tmax, vec3<f32>());
     var stack: array<vec2<u32>, STACK>;
     var height = 0u;
     let signs = select(vec3<u32>(), vec3<u32>(1u, 2u, 4u), ray.direction < vec3<f32>());
     let octant = 7u - (signs.x + signs.y + signs.z);
     // The first of some inner nodes, and which of their slots are left to visit.
-    var group = vec2<u32>(0u, 0x80000000u);
+    var group = vec2<u32>(root, 0x80000000u);
     loop {
         if group.y > 0x00ffffffu {
             let bit = firstLeadingBit(group.y);
@@ -197,6 +203,6 @@ fn walk(ray: Ray, any: bool, front: bool) -> Hit {
     return best;
 }
 
-fn occluded(ray: Ray, front: bool) -> bool {
-    return walk(ray, true, front).triangle != MISS;
+fn occluded(root: u32, ray: Ray, front: bool) -> bool {
+    return walk_from(root, ray, true, front).triangle != MISS;
 }
