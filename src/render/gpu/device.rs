@@ -83,8 +83,9 @@ impl Device {
         self.info.device_type == wgpu::DeviceType::Cpu
     }
 
-    /// Compiles an entry point of some WGSL. Its buffers are all in group 0.
-    pub fn kernel(&self, source: &str, entry: &str) -> Result<Kernel, RenderError> {
+    /// Compiles an entry point of some WGSL, for these values of its `override`
+    /// constants. Its buffers are all in group 0.
+    pub fn kernel(&self, source: &str, entry: &str, constants: &[(&str, f64)]) -> Result<Kernel, RenderError> {
         self.guarded(|| {
             let descriptor =
                 wgpu::ShaderModuleDescriptor { label: Some(entry), source: wgpu::ShaderSource::Wgsl(source.into()) };
@@ -104,7 +105,10 @@ impl Device {
                 layout: None,
                 module: &module,
                 entry_point: Some(entry),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants,
+                    zero_initialize_workgroup_memory: false,
+                },
                 cache: None,
             });
             Ok(Kernel { pipeline })

@@ -36,7 +36,8 @@ struct Surface {
 /// Buffers that depend on the number of pixels.
 pub(super) struct Images {
     pixels: u64,
-    stage: Stage,
+    /// What `shade` computes.
+    program: Program,
     surfaces: wgpu::Buffer,
     sums: wgpu::Buffer,
     decisions: wgpu::Buffer,
@@ -110,10 +111,15 @@ impl<'a> LoadedGpu<'a> {
     /// The buffers of the job before where they fit, else new ones.
     pub(super) fn take_images(&mut self, job: &Job<'_>, program: &Program) -> Result<Images, RenderError> {
         let pixels = job.view.pixels() as u64;
-        match self.images.take() {
-            Some(images) if images.pixels == pixels && images.stage == program.stage => Ok(images),
-            _ => self.gpu.device.guarded(|| self.images(pixels, program.stage)),
-        }
+        let kept = self.images.take().filter(|i| i.pixels == pixels && i.program.stage == program.stage);
+        self.gpu.device.guarded(|| {
+            let Some(mut images) = kept else { return self.images(pixels, program) };
+            if images.program.constants() != program.constants() {
+                images.shade = self.bound_shade(program, &images.surfaces, &images.sums, &images.decisions)?;
+            }
+            images.program = *program;
+            Ok(images)
+        })
     }
 
     /// Keeps buffers for the next job.
@@ -121,7 +127,8 @@ impl<'a> LoadedGpu<'a> {
         self.images = Some(images);
     }
 
-    fn images(&mut self, pixels: u64, stage: Stage) -> Result<Images, RenderError> {
+    fn images(&mut self, pixels: u64, program: &Program) -> Result<Images, RenderError> {
+        let stage = program.stage;
         if stage == Stage::Indirect && self.materials.is_none() {
             self.materials = Some(self.materials()?);
         }
@@ -130,19 +137,37 @@ impl<'a> LoadedGpu<'a> {
         let surfaces = buffer("surfaces", size_of::<Surface>())?;
         let sums = buffer("sums", size_of::<f32>() * stage.channels() as usize)?;
         let decisions = buffer("decisions", size_of::<Decisions>())?;
+        let see = self.bound(self.gpu.kernel(SHADER, "see")?, &surfaces, &sums, Some((5, &decisions)));
+        let shade = self.bound_shade(program, &surfaces, &sums, &decisions)?;
+        Ok(Images { pixels, program: *program, surfaces, sums, decisions, see, shade })
+    }
+
+    fn bound_shade(
+        &self,
+        program: &Program,
+        surfaces: &wgpu::Buffer,
+        sums: &wgpu::Buffer,
+        decisions: &wgpu::Buffer,
+    ) -> Result<Bound, RenderError> {
+        let (entry, more) = match program.stage {
+            Stage::Openness => ("openness", Some((5, decisions))),
+            Stage::Indirect => ("indirect", self.materials.as_ref().map(|m| (6, m))),
+        };
+        let kernel = self.gpu.specialized(SHADER, entry, program.constants())?;
+        Ok(self.bound(kernel, surfaces, sums, more))
+    }
+
+    fn bound(
+        &self,
+        kernel: Arc<Kernel>,
+        surfaces: &wgpu::Buffer,
+        sums: &wgpu::Buffer,
+        more: Option<(u32, &wgpu::Buffer)>,
+    ) -> Bound {
         let [tree, triangles] = self.tracing();
-        let scene = [(0, &self.params), tree, triangles, (3, &surfaces), (4, &sums)];
-        let with = |entry, more: Option<(u32, &wgpu::Buffer)>| {
-            let kernel = self.gpu.kernel(SHADER, entry)?;
-            let group = device.bind(&kernel, &scene.into_iter().chain(more).collect::<Vec<_>>());
-            Ok::<_, RenderError>(Bound { kernel, group })
-        };
-        let see = with("see", Some((5, &decisions)))?;
-        let shade = match stage {
-            Stage::Openness => with("openness", Some((5, &decisions)))?,
-            Stage::Indirect => with("indirect", self.materials.as_ref().map(|m| (6, m)))?,
-        };
-        Ok(Images { pixels, stage, surfaces, sums, decisions, see, shade })
+        let scene = [(0, &self.params), tree, triangles, (3, surfaces), (4, sums)];
+        let group = self.gpu.device.bind(&kernel, &scene.into_iter().chain(more).collect::<Vec<_>>());
+        Bound { kernel, group }
     }
 
     /// Finds what the view sees, in pieces that are each a submission of their own.

@@ -25,11 +25,19 @@ const SHADER: &str = concat!(
     include_str!("shaders/indirect.wgsl")
 );
 
+/// Values of a shader's `override` constants by name. What a whole dispatch shares
+/// is a constant of its kernel: the driver then drops what an estimator does not
+/// use, and the registers it would take.
+type Constants = Vec<(&'static str, u32)>;
+
+/// Source, entry point and constants.
+type KernelKey = (&'static str, &'static str, Constants);
+
 /// A device with its kernels.
 pub struct Gpu {
     device: Device,
-    /// By source and entry point, those that were used.
-    kernels: Mutex<BTreeMap<(&'static str, &'static str), Arc<Kernel>>>,
+    /// Those that were used.
+    kernels: Mutex<BTreeMap<KernelKey, Arc<Kernel>>>,
 }
 
 /// The backends that aogauge computes on.
@@ -83,14 +91,27 @@ impl Gpu {
         Ok(Gpu { device: Device::open(adapter, checks)?, kernels: Mutex::default() })
     }
 
-    /// An entry point of a shader, compiled when it is first used.
+    /// An entry point of a shader without constants.
     fn kernel(&self, source: &'static str, entry: &'static str) -> Result<Arc<Kernel>, RenderError> {
+        self.specialized(source, entry, Constants::new())
+    }
+
+    /// An entry point of a shader, compiled when it is first used with these
+    /// values of its `override` constants.
+    fn specialized(
+        &self,
+        source: &'static str,
+        entry: &'static str,
+        constants: Constants,
+    ) -> Result<Arc<Kernel>, RenderError> {
         let mut kernels = self.kernels.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(kernel) = kernels.get(&(source, entry)) {
+        let key = (source, entry, constants);
+        if let Some(kernel) = kernels.get(&key) {
             return Ok(kernel.clone());
         }
-        let kernel = Arc::new(self.device.kernel(source, entry)?);
-        kernels.insert((source, entry), kernel.clone());
+        let values: Vec<(&str, f64)> = key.2.iter().map(|&(name, value)| (name, f64::from(value))).collect();
+        let kernel = Arc::new(self.device.kernel(source, entry, &values)?);
+        kernels.insert(key, kernel.clone());
         Ok(kernel)
     }
 

@@ -1,5 +1,6 @@
 //! What a dispatch is told: view, method, which places and rays.
 
+use super::Constants;
 use crate::render::{Estimator, Faces, Falloff, Job, Openness, ReceiverPlane, RenderError, SecondaryOrigin, Sides};
 use aogauge_scenes::View;
 use bytemuck::{Pod, Zeroable};
@@ -26,13 +27,10 @@ pub(super) struct Params {
     secondary_radius: f32,
     offset: f32,
     reach: f32,
-    falloff: u32,
+    height: u32,
     unused: [u32; 2],
     falloff_numbers: [f32; 3],
-    options: u32,
-    secondary_rays: u32,
-    height: u32,
-    unused_too: [u32; 2],
+    unused_too: u32,
 }
 
 /// What the GPU computes of an estimator.
@@ -104,11 +102,21 @@ impl Program {
         }
     }
 
+    /// What all dispatches share: constants of the kernel.
+    pub fn constants(&self) -> Constants {
+        let mut constants = vec![("FALLOFF", numbers(self.method.falloff).0)];
+        if self.stage == Stage::Openness {
+            constants.push(("OPTIONS", options(&self.method)));
+            constants.push(("SECONDARY_RAYS", self.method.extension.map_or(0, |e| e.secondary_rays)));
+        }
+        constants
+    }
+
     /// What the dispatch over some places and rays of a job is told; `offset` is
     /// how far ray origins are pushed off surfaces.
     pub fn params(&self, job: &Job<'_>, offset: f32, places: Range<u32>, rays: Range<u32>) -> Params {
         let ao = self.method.scale.on(job.ao);
-        let (falloff, falloff_numbers) = numbers(self.method.falloff);
+        let (_, falloff_numbers) = numbers(self.method.falloff);
         let View { resolution, origin, origin_dx, origin_dy, direction, direction_dx, direction_dy } = *job.view;
         Params {
             origin: origin.to_array(),
@@ -128,13 +136,10 @@ impl Program {
             secondary_radius: ao.secondary_radius,
             offset,
             reach: self.method.reach(ao.radius),
-            falloff,
+            height: resolution[1],
             unused: [0; 2],
             falloff_numbers,
-            options: options(&self.method),
-            secondary_rays: self.method.extension.map_or(0, |e| e.secondary_rays),
-            height: resolution[1],
-            unused_too: [0; 2],
+            unused_too: 0,
         }
     }
 }

@@ -23,15 +23,17 @@ struct Params {
     offset: f32,
     // How far a primary ray looks.
     reach: f32,
-    // STEP, EXPONENTIAL, LINEAR_TAIL or GAUSSIAN, with its numbers in order.
-    falloff: u32,
-    falloff_numbers: vec3<f32>,
-    // FRONT, CLIPPED, ONE_SIDED, JITTERED, TURNED.
-    options: u32,
-    // 0 for methods without.
-    secondary_rays: u32,
     height: u32,
+    // Numbers of the falloff, in order.
+    falloff_numbers: vec3<f32>,
 }
+
+// STEP, EXPONENTIAL, LINEAR_TAIL or GAUSSIAN.
+override FALLOFF: u32 = 0u;
+// FRONT, CLIPPED, ONE_SIDED, JITTERED, TURNED, a bit each.
+override OPTIONS: u32 = 0u;
+// 0 for methods without.
+override SECONDARY_RAYS: u32 = 0u;
 
 const STEP = 0u;
 const EXPONENTIAL = 1u;
@@ -59,7 +61,7 @@ fn pixel_of(invocation: u32) -> u32 {
 }
 
 fn is_set(option: u32) -> bool {
-    return (params.options & option) != 0u;
+    return (OPTIONS & option) != 0u;
 }
 
 struct Surface {
@@ -125,7 +127,7 @@ fn tangents(n: vec3<f32>) -> array<vec3<f32>, 2> {
 // mu of a hit at distance d.
 fn mu(d: f32) -> f32 {
     let n = params.falloff_numbers;
-    switch params.falloff {
+    switch FALLOFF {
         case EXPONENTIAL: { return 1.0 - exp(-n.x * d); }
         case LINEAR_TAIL: { return clamp(1.0 - (1.0 - d / params.radius) / n.x, 0.0, 1.0); }
         case GAUSSIAN: {
@@ -146,7 +148,7 @@ struct Primary {
 
 fn primary(root: u32, origin: vec3<f32>, w: vec3<f32>) -> Primary {
     let ray = new_ray(origin, w, params.reach);
-    let hit = walk_from(root, ray, params.falloff == STEP, is_set(FRONT));
+    let hit = walk_from(root, ray, FALLOFF == STEP, is_set(FRONT));
     if hit.triangle == MISS {
         return Primary(false, 1.0, params.radius);
     }
@@ -165,7 +167,7 @@ struct Fan {
 fn closed(root: u32, fan: Fan, i: u32, turned: f32) -> bool {
     let period = select(0.5, 1.0, is_set(ONE_SIDED));
     let shift = select(0.0, turned, is_set(TURNED));
-    let at = turn((f32(i) + shift) * period / f32(params.secondary_rays));
+    let at = turn((f32(i) + shift) * period / f32(SECONDARY_RAYS));
     let d = fan.d1 * at.x + fan.d2 * at.y;
     let slope = at.y * fan.sin_theta;
     let reach = params.secondary_radius;
@@ -195,7 +197,7 @@ fn decide(root: u32, origin: vec3<f32>, normal: vec3<f32>, t: vec3<f32>, b: vec3
     let w = along * sin_theta + normal * cos_theta;
     let first = primary(root, origin, w);
     var decided = Decided(first.hit, first.mu, 0u);
-    if first.mu > 0.0 && params.secondary_rays > 0u {
+    if first.mu > 0.0 && SECONDARY_RAYS > 0u {
         let share = select(0.5, shift.x, is_set(JITTERED));
         let fan = Fan(
             origin + w * (share * first.length),
@@ -204,7 +206,7 @@ fn decide(root: u32, origin: vec3<f32>, normal: vec3<f32>, t: vec3<f32>, b: vec3
             sin_theta,
             along * cos_theta - normal * sin_theta,
         );
-        for (var i = 0u; i < params.secondary_rays; i++) {
+        for (var i = 0u; i < SECONDARY_RAYS; i++) {
             decided.closed |= select(0u, 1u << i, closed(root, fan, i, shift.y));
         }
     }
@@ -216,7 +218,7 @@ fn decide(root: u32, origin: vec3<f32>, normal: vec3<f32>, t: vec3<f32>, b: vec3
 // quarter of the offset lies in truth under it, and upward rays meet none of that;
 // secondary rays that the receiver closes do.
 fn surroundings(origin: vec3<f32>, normal: vec3<f32>) -> Surroundings {
-    let has_secondary = params.secondary_rays > 0u;
+    let has_secondary = SECONDARY_RAYS > 0u;
     let share = select(0.5, 1.0, is_set(JITTERED));
     let around = select(0.0, length(vec2<f32>(share * params.radius, params.secondary_radius)), has_secondary);
     let radius = max(params.reach, around) * 1.00001;
@@ -238,11 +240,11 @@ fn openness(@builtin(global_invocation_id) id: vec3<u32>) {
     let frame = tangents(surface.normal);
     let root = survey(surroundings(origin, surface.normal));
     if root == MISS {
-        sums[pixel] += f32(params.rays) * f32(max(params.secondary_rays, 1u));
+        sums[pixel] += f32(params.rays) * f32(max(SECONDARY_RAYS, 1u));
         return;
     }
     let sampler = sampler_seed(params.seed, pixel, params.replicate);
-    let chance = (params.options & (JITTERED | TURNED)) != 0u;
+    let chance = (OPTIONS & (JITTERED | TURNED)) != 0u;
     var sum = 0.0;
     var done = 0u;
     var decisions_here = decisions[pixel];
@@ -253,7 +255,7 @@ fn openness(@builtin(global_invocation_id) id: vec3<u32>) {
         }
         let decided = decide(root, origin, surface.normal, frame[0], frame[1], pair(sampler, i, 0u), shift);
         // In units of one secondary ray, so that without falloff the sum is exact.
-        let units = select(1.0, f32(params.secondary_rays - countOneBits(decided.closed)), params.secondary_rays > 0u);
+        let units = select(1.0, f32(SECONDARY_RAYS - countOneBits(decided.closed)), SECONDARY_RAYS > 0u);
         sum += decided.mu * units;
         if i < 32u {
             decisions_here.primary |= select(0u, 1u << i, decided.hit);
