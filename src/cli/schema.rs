@@ -1,7 +1,7 @@
 //! `aogauge schema`
 
 use super::{Exit, Failure, json, print};
-use crate::{flatland::Study, record::Record, scenes::Scene, suite::SuiteFile};
+use crate::{bench::GpuBench, flatland::Study, record::Record, scenes::Scene, suite::SuiteFile};
 use clap::ValueEnum;
 
 /// Print the JSON Schema of a format.
@@ -24,6 +24,8 @@ enum Of {
     Scene,
     /// flatland.json
     Flatland,
+    /// bench.json
+    Bench,
 }
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
@@ -32,6 +34,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
         Of::Suite => schemars::schema_for!(SuiteFile),
         Of::Scene => Scene::file_schema(),
         Of::Flatland => schemars::schema_for!(Study),
+        Of::Bench => schemars::schema_for!(GpuBench),
     };
     print(&json(&schema)?)?;
     Ok(Exit::Pass)
