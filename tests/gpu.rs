@@ -6,7 +6,7 @@
 use aogauge::{
     render::{
         Estimator, Extension, Faces, Falloff, Frame, Geometry, Job, LocalIndirect, Openness, ReceiverPlane, Renderer,
-        Scale, SecondaryOrigin, Sides, cpu::Cpu, gpu::Checks, gpu::Gpu,
+        Scale, SecondaryOrigin, Sides, cpu::Cpu, gpu::Checks, gpu::Gpu, gpu::Options,
     },
     scenes::{AoScale, Scene, View, library},
 };
@@ -213,7 +213,7 @@ fn checks_change_nothing() {
     let falloff = Falloff::LinearTail { tail: 0.6 };
     let indirect = Estimator::LocalIndirect(LocalIndirect { falloff, scale: Scale::default() });
     let images = [Checks::On, Checks::Off].map(|checks| {
-        let gpu = Gpu::open_with(checks).unwrap();
+        let gpu = Gpu::with(Options { checks, ..Options::default() }).unwrap();
         let mut loaded = gpu.load(&geometry).unwrap();
         [ESTIMATORS[0], ESTIMATORS[1], ESTIMATORS[2], Estimator::Openness(step), indirect].map(|estimator| {
             let job = Job { view: &view, estimator, ao: scene.ao, rays: 4, seed: 3, replicate: 0 };

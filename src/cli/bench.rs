@@ -1,6 +1,6 @@
 //! `aogauge bench`
 
-use super::{Exit, Failure, Format, json, print, run::bar, scene::load, tell};
+use super::{Exit, Failure, Format, json, on_gpu::OnGpu, print, run::bar, scene::load, tell};
 use crate::{
     bench::{GpuBench, MOST_RAYS, Settings, VERSION, scene},
     disk::write_whole,
@@ -42,6 +42,8 @@ pub struct GpuArgs {
     /// Seed of all randomness.
     #[arg(long, default_value_t = 1)]
     seed: u32,
+    #[command(flatten)]
+    on_gpu: OnGpu,
     /// Folder for bench.json and bench.md.
     #[arg(long)]
     out: Option<PathBuf>,
@@ -69,7 +71,7 @@ pub fn execute(verb: &Verb) -> Result<Exit, Failure> {
 
 fn gpu(args: &GpuArgs) -> Result<Exit, Failure> {
     let scenes = args.scenes.iter().map(|name| load(name)).collect::<Result<Vec<_>, _>>()?;
-    let gpu = Gpu::open().map_err(|e| Failure::usage(e.to_string()))?;
+    let gpu = Gpu::with(args.on_gpu.options()).map_err(|e| Failure::usage(e.to_string()))?;
     let usual = |hardware, software| if gpu.is_software() { software } else { hardware };
     let rounds =
         Rounds { warm_up: args.warm_up.unwrap_or(usual(10, 1)), counted: args.rounds.unwrap_or(usual(50, 10)) };

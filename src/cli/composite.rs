@@ -344,7 +344,7 @@ fn composite(
     let fail = |e: RenderError| Failure::usage(format!("scene '{}': {e}", scene.name));
     let geometry = Geometry::new(scene).map_err(fail)?;
     let materials = Materials::new(scene);
-    let gpu = args.method.renderer.gpu().map_err(fail)?;
+    let gpu = args.method.gpu().map_err(fail)?;
     let renderer: &dyn Renderer = gpu.as_ref().map_or(&Cpu, |g| g);
     let mut loaded = renderer.load(&geometry).map_err(fail)?;
     let methods: Vec<Option<Estimator>> = methods.iter().map(|(_, e)| *e).collect();

@@ -5,6 +5,7 @@ mod composite;
 mod doctor;
 mod flatland;
 mod golden;
+mod on_gpu;
 mod render;
 mod report;
 mod run;

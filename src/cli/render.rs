@@ -1,6 +1,6 @@
 //! `aogauge render`
 
-use super::{Exit, Failure, Format, json, print, scene::load, tell};
+use super::{Exit, Failure, Format, json, on_gpu::OnGpu, print, scene::load, tell};
 use crate::{
     layers::Layers,
     render::{Estimator, Frame, Geometry, Job, Kind, ReceiverPlane, RenderError, Renderer, cpu::Cpu, gpu::Gpu},
@@ -19,6 +19,7 @@ use std::path::{Path, PathBuf};
 aogauge render curtain-arcade --estimator extended --set receiver_plane=clipped --rays 256 --out extended.exr\n  \
 aogauge render curtain-room --estimator obscurance --set 'falloff={ exponential = { extinction = 4.0 } }' --out o.exr\n  \
 aogauge render atrium --preset unity-high --view look --out unity.png\n  \
+aogauge render atrium --view look --renderer gpu --g-buffer raster --out hybrid.png\n  \
 aogauge render curtain-arcade --estimator path-traced --rays 1024 --replicates 8 --out judge.exr")]
 pub struct Args {
     /// A built-in scene by name, or a scene file.
@@ -68,6 +69,8 @@ pub(super) struct Method {
     /// Who renders.
     #[arg(long, value_enum, default_value_t)]
     pub renderer: By,
+    #[command(flatten)]
+    on_gpu: OnGpu,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -163,14 +166,6 @@ impl By {
             By::Gpu => "gpu",
         }
     }
-
-    /// The GPU, where it is to render.
-    pub fn gpu(self) -> Result<Option<Gpu>, RenderError> {
-        match self {
-            By::Cpu => Ok(None),
-            By::Gpu => Gpu::open().map(Some),
-        }
-    }
 }
 
 impl Which {
@@ -187,8 +182,19 @@ impl Method {
     /// The method that the options describe, `unless_given` where they name none,
     /// and the rays a pixel.
     pub fn build(&self, unless_given: Kind) -> Result<(Estimator, u32), Failure> {
+        if self.renderer == By::Cpu {
+            self.on_gpu.refuse()?;
+        }
         let (estimator, own_rays) = method(self, unless_given)?;
         Ok((estimator, self.rays.or(own_rays).unwrap_or(64)))
+    }
+
+    /// The GPU, where it is to render.
+    pub fn gpu(&self) -> Result<Option<Gpu>, RenderError> {
+        match self.renderer {
+            By::Cpu => Ok(None),
+            By::Gpu => Gpu::with(self.on_gpu.options()).map(Some),
+        }
     }
 }
 
@@ -249,7 +255,7 @@ fn frames(args: &Args, scene: &Scene, estimator: Estimator, rays: u32) -> Result
     let fail = |e: RenderError| Failure::usage(format!("scene '{}': {e}", scene.name));
     let twin = args.twin.then(|| scene.twin());
     let geometry = Geometry::new(twin.as_ref().unwrap_or(scene)).map_err(fail)?;
-    let gpu = args.method.renderer.gpu().map_err(fail)?;
+    let gpu = args.method.gpu().map_err(fail)?;
     let renderer: &dyn Renderer = gpu.as_ref().map_or(&Cpu, |g| g);
     let mut loaded = renderer.load(&geometry).map_err(fail)?;
     let frame = |replicate| {

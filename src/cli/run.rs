@@ -1,6 +1,6 @@
 //! `aogauge run`
 
-use super::{Exit, Failure, Format, json, print, tell};
+use super::{Exit, Failure, Format, json, on_gpu::OnGpu, print, tell};
 use crate::{
     judge_cache::JudgeCache,
     record::{Machine, Record, RecordFolder},
@@ -31,6 +31,8 @@ pub struct Args {
     /// Who renders.
     #[arg(long, value_enum, default_value_t)]
     renderer: Choice,
+    #[command(flatten)]
+    on_gpu: OnGpu,
     /// CPU threads; all unless given. Results do not depend on it.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -83,7 +85,7 @@ pub(super) fn bar() -> Bar {
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
     let suite = Suite::load(&args.suite)?;
-    let (gpu, missing) = open(args.renderer)?;
+    let (gpu, missing) = open(args)?;
     let mut pool = rayon::ThreadPoolBuilder::new();
     if let Some(threads) = args.threads {
         pool = pool.num_threads(threads.into());
@@ -128,12 +130,18 @@ fn render(args: &Args, suite: &Suite, gpu: Option<&Gpu>, missing: &str) -> Resul
 }
 
 /// The GPU, or why there is none.
-fn open(choice: Choice) -> Result<(Option<Gpu>, String), Failure> {
-    match choice {
-        Choice::Cpu => Ok((None, "not asked for (--renderer cpu)".to_owned())),
-        Choice::Gpu => Gpu::open().map(|g| (Some(g), String::new())).map_err(|e| Failure::usage(e.to_string())),
-        Choice::Auto => Ok(match Gpu::open() {
+fn open(args: &Args) -> Result<(Option<Gpu>, String), Failure> {
+    let gpu = || Gpu::with(args.on_gpu.options());
+    match args.renderer {
+        Choice::Cpu => {
+            args.on_gpu.refuse()?;
+            Ok((None, "not asked for (--renderer cpu)".to_owned()))
+        }
+        Choice::Gpu => gpu().map(|g| (Some(g), String::new())).map_err(|e| Failure::usage(e.to_string())),
+        Choice::Auto => Ok(match gpu() {
             Ok(gpu) => (Some(gpu), String::new()),
+            // Who says how the GPU is to render wants it to.
+            Err(e) if args.on_gpu.is_given() => return Err(Failure::usage(e.to_string())),
             Err(e) => (None, e.to_string()),
         }),
     }

@@ -198,6 +198,12 @@ pub enum RenderError {
         /// Levels allowed.
         limit: usize,
     },
+    /// Triangles cannot be drawn: by this adapter, or into this view.
+    #[error("the GPU cannot rasterise the G-buffer: {0}; --g-buffer rays can do without")]
+    Raster(String),
+    /// The adapter has no ray query, or not for so large a scene.
+    #[error("the GPU cannot trace by ray query: {0}; --traversal software can do without")]
+    RayQuery(String),
     /// The device was lost, ran out of memory or refused a command.
     #[error("the GPU failed: {0}")]
     Device(String),

@@ -1,4 +1,5 @@
-//! Watertight ray-triangle test, without an epsilon.
+//! Watertight ray-triangle test, without an epsilon. Twin:
+//! `gpu/shaders/triangle.wgsl`.
 //!
 //! Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013.
 //! The vertices are moved and sheared so that the ray is the z axis; the signs of

@@ -21,6 +21,8 @@ pub(super) struct Device {
     checks: Checks,
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
+    /// Whether shaders may use ray query.
+    pub ray_query: bool,
     /// Nanoseconds a tick, where the device has timestamp queries.
     tick: Option<f32>,
     /// What went wrong outside an error scope: a lost device, a driver's refusal.
@@ -43,20 +45,35 @@ pub(super) struct Kernel {
 }
 
 impl Device {
-    /// Opens an adapter with the largest buffers it has.
-    pub fn open(adapter: &wgpu::Adapter, checks: Checks) -> Result<Self, RenderError> {
+    /// Opens an adapter with the largest buffers it has, and with ray query where
+    /// that is asked for.
+    pub fn open(adapter: &wgpu::Adapter, checks: Checks, ray_query: bool) -> Result<Self, RenderError> {
         let has = adapter.limits();
-        let required_limits = wgpu::Limits {
+        let mut required_limits = wgpu::Limits {
             max_storage_buffer_binding_size: has.max_storage_buffer_binding_size,
             max_buffer_size: has.max_buffer_size,
             max_texture_dimension_2d: has.max_texture_dimension_2d,
             ..wgpu::Limits::default()
         };
         let timestamps = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
+        let mut required_features = timestamps;
+        let mut experimental_features = wgpu::ExperimentalFeatures::disabled();
+        if ray_query {
+            required_features |= wgpu::Features::EXPERIMENTAL_RAY_QUERY;
+            required_limits = required_limits.using_acceleration_structure_values(has);
+            // SAFETY: the token says that wgpu may have bugs there that safe code
+            // meets. This code stays within what its specification of ray query
+            // asks for: structures are built from buffers that hold all their
+            // vertices before any query, bind groups keep them, a query is
+            // initialised before it goes on and not asked again once it ended.
+            // Tested by tests/gpu_query.rs.
+            experimental_features = unsafe { wgpu::ExperimentalFeatures::enabled() };
+        }
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("aogauge"),
-            required_features: timestamps,
+            required_features,
             required_limits,
+            experimental_features,
             ..wgpu::DeviceDescriptor::default()
         }))
         .map_err(|e| RenderError::Device(e.to_string()))?;
@@ -75,7 +92,7 @@ impl Device {
             }
         });
         let tick = (!timestamps.is_empty()).then(|| queue.get_timestamp_period());
-        Ok(Device { info: adapter.get_info(), checks, device, queue, tick, trouble })
+        Ok(Device { info: adapter.get_info(), checks, device, queue, ray_query, tick, trouble })
     }
 
     /// Whether the adapter computes on the CPU, as Mesa's software driver does.
@@ -83,23 +100,28 @@ impl Device {
         self.info.device_type == wgpu::DeviceType::Cpu
     }
 
+    /// Some WGSL, for pipelines.
+    pub fn module(&self, label: &str, source: &str) -> wgpu::ShaderModule {
+        let descriptor =
+            wgpu::ShaderModuleDescriptor { label: Some(label), source: wgpu::ShaderSource::Wgsl(source.into()) };
+        match self.checks {
+            Checks::On => self.device.create_shader_module(descriptor),
+            // SAFETY: all indices of our shaders come from what this program
+            // uploads (nodes and triangles of one tree, pixels of images that are
+            // as large as the dispatch says), and loops end with the tree, whose
+            // depth is checked against the stack. Tested by `checks_change_nothing`
+            // in tests/gpu.rs, which renders the same with every check on.
+            Checks::Off => unsafe {
+                self.device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked())
+            },
+        }
+    }
+
     /// Compiles an entry point of some WGSL, for these values of its `override`
     /// constants. Its buffers are all in group 0.
     pub fn kernel(&self, source: &str, entry: &str, constants: &[(&str, f64)]) -> Result<Kernel, RenderError> {
         self.guarded(|| {
-            let descriptor =
-                wgpu::ShaderModuleDescriptor { label: Some(entry), source: wgpu::ShaderSource::Wgsl(source.into()) };
-            let module = match self.checks {
-                Checks::On => self.device.create_shader_module(descriptor),
-                // SAFETY: all indices of our shaders come from what this program
-                // uploads (nodes and triangles of one tree, pixels of images that are
-                // as large as the dispatch says), and loops end with the tree, whose
-                // depth is checked against the stack. Tested by `checks_change_nothing`
-                // in tests/gpu.rs, which renders the same with every check on.
-                Checks::Off => unsafe {
-                    self.device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked())
-                },
-            };
+            let module = self.module(entry, source);
             let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some(entry),
                 layout: None,
@@ -129,10 +151,12 @@ impl Device {
     /// A buffer that kernels read.
     pub fn upload(&self, label: &'static str, contents: &[u8]) -> Result<wgpu::Buffer, RenderError> {
         self.fits(label, contents.len() as u64)?;
+        // What a driver's tree is built of.
+        let input = if self.ray_query { wgpu::BufferUsages::BLAS_INPUT } else { wgpu::BufferUsages::empty() };
         Ok(self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: Some(label),
             contents,
-            usage: wgpu::BufferUsages::STORAGE,
+            usage: wgpu::BufferUsages::STORAGE | input,
         }))
     }
 
@@ -145,17 +169,23 @@ impl Device {
         })
     }
 
-    /// Gives a kernel its buffers: exactly those that its entry point uses.
-    pub fn bind(&self, kernel: &Kernel, buffers: &[(u32, &wgpu::Buffer)]) -> wgpu::BindGroup {
-        let entries: Vec<wgpu::BindGroupEntry<'_>> = buffers
+    /// Gives a kernel its buffers, and what else it has bound: exactly those that
+    /// its entry point uses.
+    pub fn bind(&self, kernel: &Kernel, resources: &[(u32, wgpu::BindingResource<'_>)]) -> wgpu::BindGroup {
+        self.group(&kernel.pipeline.get_bind_group_layout(0), resources)
+    }
+
+    /// The same for any pipeline, by its layout.
+    pub fn group(
+        &self,
+        layout: &wgpu::BindGroupLayout,
+        resources: &[(u32, wgpu::BindingResource<'_>)],
+    ) -> wgpu::BindGroup {
+        let entries: Vec<wgpu::BindGroupEntry<'_>> = resources
             .iter()
-            .map(|&(binding, b)| wgpu::BindGroupEntry { binding, resource: b.as_entire_binding() })
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding: *binding, resource: resource.clone() })
             .collect();
-        self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout: &kernel.pipeline.get_bind_group_layout(0),
-            entries: &entries,
-        })
+        self.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
     }
 
     /// Submits one dispatch; a timer notes when it began and ended.
@@ -164,19 +194,14 @@ impl Device {
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                 label: None,
-                timestamp_writes: timer.map(|(t, _)| wgpu::ComputePassTimestampWrites {
-                    query_set: &t.queries,
-                    beginning_of_pass_write_index: Some(0),
-                    end_of_pass_write_index: Some(1),
-                }),
+                timestamp_writes: timer.map(|(t, _)| t.of_dispatch()),
             });
             pass.set_pipeline(&kernel.pipeline);
             pass.set_bind_group(0, group, &[]);
             pass.dispatch_workgroups(invocations.div_ceil(WORKGROUP), 1, 1);
         }
         if let Some((t, slot)) = timer {
-            encoder.resolve_query_set(&t.queries, 0..2, &t.resolved, 0);
-            encoder.copy_buffer_to_buffer(&t.resolved, 0, &t.ticks, slot * TICKS, TICKS);
+            t.note(&mut encoder, slot);
         }
         self.queue.submit([encoder.finish()]);
     }
@@ -187,6 +212,11 @@ impl Device {
             .poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) })
             .map_err(|e| RenderError::Device(e.to_string()))?;
         self.check()
+    }
+
+    /// Times by the CPU's clock from now on.
+    pub fn ignore_timestamps(&mut self) {
+        self.tick = None;
     }
 
     /// Whether dispatches can be timed by the device itself.
@@ -286,6 +316,30 @@ impl Timer {
             ticks: buffer("ticks", dispatches * TICKS, to | from),
             tick,
         })
+    }
+
+    /// For a compute pass whose beginning and end count.
+    fn of_dispatch(&self) -> wgpu::ComputePassTimestampWrites<'_> {
+        wgpu::ComputePassTimestampWrites {
+            query_set: &self.queries,
+            beginning_of_pass_write_index: Some(0),
+            end_of_pass_write_index: Some(1),
+        }
+    }
+
+    /// For a render pass, likewise.
+    pub fn of_draw(&self) -> wgpu::RenderPassTimestampWrites<'_> {
+        wgpu::RenderPassTimestampWrites {
+            query_set: &self.queries,
+            beginning_of_pass_write_index: Some(0),
+            end_of_pass_write_index: Some(1),
+        }
+    }
+
+    /// After that pass: keeps its times in a slot.
+    pub fn note(&self, encoder: &mut wgpu::CommandEncoder, slot: u64) {
+        encoder.resolve_query_set(&self.queries, 0..2, &self.resolved, 0);
+        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.ticks, slot * TICKS, TICKS);
     }
 
     /// Seconds that each dispatch took.

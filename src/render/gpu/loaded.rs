@@ -1,9 +1,11 @@
 //! A scene on the GPU, and the dispatches that render it.
 
 use super::{
-    Gpu, SHADER,
+    GBufferBy, Gpu, SHADER,
     device::{Kernel, Timer, WORKGROUP},
     params::{Params, Program, Stage, places},
+    query,
+    raster::Raster,
 };
 use crate::{
     render::{Frame, Geometry, Job, Loaded, RenderError, ao::Decisions},
@@ -35,12 +37,14 @@ struct Surface {
 
 /// Buffers that depend on the number of pixels.
 pub(super) struct Images {
-    pixels: u64,
+    resolution: [u32; 2],
     /// What `shade` computes.
     program: Program,
     surfaces: wgpu::Buffer,
     sums: wgpu::Buffer,
     decisions: wgpu::Buffer,
+    /// What is drawn before `see`, where the G-buffer is rasterised.
+    raster: Option<Raster>,
     see: Bound,
     shade: Bound,
 }
@@ -51,11 +55,19 @@ struct Bound {
     group: wgpu::BindGroup,
 }
 
+/// What rays find triangles by.
+enum Tree {
+    /// The renderer's own.
+    Nodes(wgpu::Buffer),
+    /// The driver's.
+    Query(wgpu::Tlas),
+}
+
 /// A scene on the GPU.
 pub(super) struct LoadedGpu<'a> {
     pub(super) gpu: &'a Gpu,
     geometry: &'a Geometry,
-    nodes: wgpu::Buffer,
+    tree: Tree,
     triangles: wgpu::Buffer,
     /// How each triangle of the buffer was numbered in the scene.
     source: Vec<u32>,
@@ -70,7 +82,7 @@ impl<'a> LoadedGpu<'a> {
         let device = &gpu.device;
         let tracer = &geometry.tracer;
         let wide = Wide::new(tracer);
-        if wide.depth > WIDE_STACK {
+        if !device.ray_query && wide.depth > WIDE_STACK {
             return Err(RenderError::TooDeep { levels: wide.depth, limit: WIDE_STACK });
         }
         let source: Vec<u32> = wide.order.iter().map(|&i| tracer.source()[i as usize]).collect();
@@ -80,11 +92,17 @@ impl<'a> LoadedGpu<'a> {
         };
         let corners: Vec<[Vec4; 3]> = wide.order.iter().zip(&source).map(with_number).collect();
         device.guarded(|| {
+            let triangles = device.upload("triangles", bytemuck::cast_slice(&corners))?;
+            let tree = if device.ray_query {
+                Tree::Query(query::build(device, &triangles, corners.len())?)
+            } else {
+                Tree::Nodes(device.upload("nodes", bytemuck::cast_slice(&wide.nodes))?)
+            };
             Ok(LoadedGpu {
                 gpu,
                 geometry,
-                nodes: device.upload("nodes", bytemuck::cast_slice(&wide.nodes))?,
-                triangles: device.upload("triangles", bytemuck::cast_slice(&corners))?,
+                tree,
+                triangles,
                 source,
                 materials: None,
                 params: device.uniform("params", &Params::zeroed()),
@@ -93,9 +111,13 @@ impl<'a> LoadedGpu<'a> {
         })
     }
 
-    /// What rays are traced against, with the bindings that trace.wgsl gives it.
-    fn tracing(&self) -> [(u32, &wgpu::Buffer); 2] {
-        [(1, &self.nodes), (2, &self.triangles)]
+    /// What rays are traced against, with the bindings that the shaders give it.
+    fn tracing(&self) -> [(u32, wgpu::BindingResource<'_>); 2] {
+        let tree = match &self.tree {
+            Tree::Nodes(nodes) => nodes.as_entire_binding(),
+            Tree::Query(tlas) => tlas.as_binding(),
+        };
+        [(1, tree), (2, self.triangles.as_entire_binding())]
     }
 
     /// Albedo, then emission, of each triangle in leaf order.
@@ -110,10 +132,10 @@ impl<'a> LoadedGpu<'a> {
 
     /// The buffers of the job before where they fit, else new ones.
     pub(super) fn take_images(&mut self, job: &Job<'_>, program: &Program) -> Result<Images, RenderError> {
-        let pixels = job.view.pixels() as u64;
-        let kept = self.images.take().filter(|i| i.pixels == pixels && i.program.stage == program.stage);
+        let resolution = job.view.resolution;
+        let kept = self.images.take().filter(|i| i.resolution == resolution && i.program.stage == program.stage);
         self.gpu.device.guarded(|| {
-            let Some(mut images) = kept else { return self.images(pixels, program) };
+            let Some(mut images) = kept else { return self.images(resolution, program) };
             if images.program.constants() != program.constants() {
                 images.shade = self.bound_shade(program, &images.surfaces, &images.sums, &images.decisions)?;
             }
@@ -127,19 +149,34 @@ impl<'a> LoadedGpu<'a> {
         self.images = Some(images);
     }
 
-    fn images(&mut self, pixels: u64, program: &Program) -> Result<Images, RenderError> {
+    fn images(&mut self, resolution: [u32; 2], program: &Program) -> Result<Images, RenderError> {
         let stage = program.stage;
         if stage == Stage::Indirect && self.materials.is_none() {
             self.materials = Some(self.materials()?);
         }
         let device = &self.gpu.device;
+        let pixels = resolution.map(u64::from).into_iter().product::<u64>();
         let buffer = |label, stride: usize| device.storage(label, pixels * stride as u64);
         let surfaces = buffer("surfaces", size_of::<Surface>())?;
         let sums = buffer("sums", size_of::<f32>() * stage.channels() as usize)?;
         let decisions = buffer("decisions", size_of::<Decisions>())?;
-        let see = self.bound(self.gpu.kernel(SHADER, "see")?, &surfaces, &sums, Some((5, &decisions)));
+        let (raster, see) = match self.gpu.options.g_buffer {
+            GBufferBy::Rays => {
+                (None, self.bound(self.gpu.kernel(SHADER, "see")?, &surfaces, &sums, Some((5, &decisions))))
+            }
+            GBufferBy::Raster => {
+                let [_, triangles] = self.tracing();
+                let seen = [(0, &self.params), (3, &surfaces), (4, &sums), (5, &decisions)];
+                let mut bound: Vec<_> = seen.map(|(binding, b)| (binding, b.as_entire_binding())).into();
+                bound.push(triangles.clone());
+                let count = self.source.len() as u32;
+                let raster = Raster::new(self.gpu, &self.params, triangles, count, resolution)?;
+                let (kernel, group) = raster.resolve(self.gpu, bound)?;
+                (Some(raster), Bound { kernel, group })
+            }
+        };
         let shade = self.bound_shade(program, &surfaces, &sums, &decisions)?;
-        Ok(Images { pixels, program: *program, surfaces, sums, decisions, see, shade })
+        Ok(Images { resolution, program: *program, surfaces, sums, decisions, raster, see, shade })
     }
 
     fn bound_shade(
@@ -165,35 +202,64 @@ impl<'a> LoadedGpu<'a> {
         more: Option<(u32, &wgpu::Buffer)>,
     ) -> Bound {
         let [tree, triangles] = self.tracing();
-        let scene = [(0, &self.params), tree, triangles, (3, surfaces), (4, sums)];
-        let group = self.gpu.device.bind(&kernel, &scene.into_iter().chain(more).collect::<Vec<_>>());
+        let buffers = [(0, &self.params), (3, surfaces), (4, sums)].into_iter().chain(more);
+        let bound = buffers.map(|(binding, b)| (binding, b.as_entire_binding())).chain([tree, triangles]);
+        let group = self.gpu.device.bind(&kernel, &bound.collect::<Vec<_>>());
         Bound { kernel, group }
     }
 
-    /// Finds what the view sees, in pieces that are each a submission of their own.
-    pub(super) fn see(&self, job: &Job<'_>, program: &Program, images: &Images, timer: Option<&Timer>) {
-        let pieces = self.see_pieces(job);
-        self.dispatch(job, program, &images.see, pieces, timer);
+    /// Finds what the view sees, in pieces that are each a submission of their own:
+    /// as many as [`Self::see_count`] says.
+    pub(super) fn see(
+        &self,
+        job: &Job<'_>,
+        program: &Program,
+        images: &Images,
+        timer: Option<&Timer>,
+    ) -> Result<(), RenderError> {
+        let mut drawn = 0;
+        if let Some(raster) = &images.raster {
+            let (device, near) = (&self.gpu.device, self.geometry.tracer.offset());
+            let params = program.params(job, near, 0..0, 0..0);
+            device.queue.write_buffer(&self.params, 0, bytemuck::bytes_of(&params));
+            raster.draw(device, job.view, near, timer)?;
+            drawn = raster.pieces();
+        }
+        self.dispatch(job, program, &images.see, self.see_pieces(job), timer.map(|t| (t, drawn)));
+        Ok(())
     }
 
     /// Shades what is seen, likewise.
     pub(super) fn shade(&self, job: &Job<'_>, program: &Program, images: &Images, timer: Option<&Timer>) {
         let pieces = self.pieces(job, program);
-        self.dispatch(job, program, &images.shade, pieces, timer);
+        self.dispatch(job, program, &images.shade, pieces, timer.map(|t| (t, 0)));
     }
 
-    fn dispatch(&self, job: &Job<'_>, program: &Program, bound: &Bound, pieces: Vec<Piece>, timer: Option<&Timer>) {
+    /// A timer comes with the slot of the first piece.
+    fn dispatch(
+        &self,
+        job: &Job<'_>,
+        program: &Program,
+        bound: &Bound,
+        pieces: Vec<Piece>,
+        timer: Option<(&Timer, u64)>,
+    ) {
         let device = &self.gpu.device;
         let offset = self.geometry.tracer.offset();
-        for (slot, (places, rays)) in (0..).zip(pieces) {
+        for (i, (places, rays)) in (0..).zip(pieces) {
             let count = places.len() as u32;
             let params = program.params(job, offset, places, rays);
             device.queue.write_buffer(&self.params, 0, bytemuck::bytes_of(&params));
-            device.run_timed(&bound.kernel, &bound.group, count, timer.map(|t| (t, slot)));
+            device.run_timed(&bound.kernel, &bound.group, count, timer.map(|(t, first)| (t, first + i)));
         }
     }
 
-    pub(super) fn see_pieces(&self, job: &Job<'_>) -> Vec<Piece> {
+    /// Submissions of [`Self::see`].
+    pub(super) fn see_count(&self, job: &Job<'_>, images: &Images) -> u64 {
+        images.raster.as_ref().map_or(0, Raster::pieces) + self.see_pieces(job).len() as u64
+    }
+
+    fn see_pieces(&self, job: &Job<'_>) -> Vec<Piece> {
         pieces(places(job.view.resolution), 1, 1, self.budget())
     }
 
@@ -215,7 +281,7 @@ impl Loaded for LoadedGpu<'_> {
         let frame = self.gpu.device.guarded(|| {
             let dispatches = self.pieces(job, &program).len() as u64;
             let timer = Timer::new(&self.gpu.device, dispatches);
-            self.see(job, &program, &images, None);
+            self.see(job, &program, &images, None)?;
             self.shade(job, &program, &images, timer.as_ref());
             let sums: Vec<f32> = self.gpu.device.read(&images.sums)?;
             let wall = start.elapsed().as_secs_f64();

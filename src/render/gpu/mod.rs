@@ -4,6 +4,8 @@
 mod device;
 mod loaded;
 mod params;
+mod query;
+mod raster;
 mod timing;
 
 use super::{Geometry, Loaded, RenderError, Renderer};
@@ -16,11 +18,20 @@ use std::{
 };
 pub use timing::{Clock, Rounds, Timed};
 
+/// How rays find triangles and meet them, by the renderer's own tree. One of these
+/// two is put before every other shader.
+const TRACE: &str = concat!(
+    include_str!("shaders/trace.wgsl"),
+    include_str!("shaders/survey.wgsl"),
+    include_str!("shaders/triangle.wgsl")
+);
+
+/// The same by ray query.
+const TRACE_QUERY: &str = concat!(include_str!("shaders/trace_query.wgsl"), include_str!("shaders/triangle.wgsl"));
+
 /// The shader of what a view sees, openness and indirect light.
 const SHADER: &str = concat!(
     include_str!("shaders/sampler.wgsl"),
-    include_str!("shaders/trace.wgsl"),
-    include_str!("shaders/survey.wgsl"),
     include_str!("shaders/ao.wgsl"),
     include_str!("shaders/indirect.wgsl")
 );
@@ -33,9 +44,43 @@ type Constants = Vec<(&'static str, u32)>;
 /// Source, entry point and constants.
 type KernelKey = (&'static str, &'static str, Constants);
 
+/// How the GPU finds what each pixel of a view sees.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum GBufferBy {
+    /// One ray a pixel, as on the CPU.
+    #[default]
+    Rays,
+    /// Triangles are drawn, as in a hybrid renderer.
+    Raster,
+}
+
+/// How the GPU finds the triangles that a ray meets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Traversal {
+    /// Ray query on hardware that has it, by Vulkan; else software.
+    #[default]
+    Auto,
+    /// The renderer's own tree, in a shader: on every adapter the same.
+    Software,
+    /// The driver's acceleration structure.
+    RayQuery,
+}
+
+/// How the GPU is to render.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// How it finds what each pixel sees.
+    pub g_buffer: GBufferBy,
+    /// How it finds what a ray meets.
+    pub traversal: Traversal,
+    /// Whether its shaders check what they do at run time.
+    pub checks: Checks,
+}
+
 /// A device with its kernels.
 pub struct Gpu {
     device: Device,
+    options: Options,
     /// Those that were used.
     kernels: Mutex<BTreeMap<KernelKey, Arc<Kernel>>>,
 }
@@ -57,21 +102,22 @@ fn preference(kind: wgpu::DeviceType) -> u32 {
 }
 
 impl Gpu {
+    /// Opens the best adapter there is, with the options that are the default.
+    ///
+    /// # Errors
+    /// As of [`Gpu::with`].
+    pub fn open() -> Result<Self, RenderError> {
+        Self::with(Options::default())
+    }
+
     /// Opens the best adapter there is: hardware before software. Backends can be
     /// narrowed by `WGPU_BACKEND`.
     ///
     /// # Errors
     /// [`RenderError::NoAdapter`] where there is none, [`RenderError::Device`]
-    /// where it cannot be opened.
-    pub fn open() -> Result<Self, RenderError> {
-        Self::open_with(Checks::default())
-    }
-
-    /// The same, with shaders that check what they do at run time, or do not.
-    ///
-    /// # Errors
-    /// As [`Gpu::open`].
-    pub fn open_with(checks: Checks) -> Result<Self, RenderError> {
+    /// where it cannot be opened, [`RenderError::Raster`] and
+    /// [`RenderError::RayQuery`] where it cannot do what the options ask for.
+    pub fn with(options: Options) -> Result<Self, RenderError> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
         descriptor.backends &= backends();
         let backends = descriptor.backends;
@@ -84,11 +130,21 @@ impl Gpu {
                     .into(),
             )
         })?;
-        Self::on(&adapter, checks)
+        let by_query = query::is_chosen(options.traversal, &adapter)?;
+        let mut device = Device::open(&adapter, options.checks, by_query)?;
+        if options.g_buffer == GBufferBy::Raster {
+            raster::check(&adapter)?;
+            // Mesa 22.3's stamps compute passes wrongly once something was drawn.
+            if device.is_software() {
+                device.ignore_timestamps();
+            }
+        }
+        Ok(Gpu { device, options, kernels: Mutex::default() })
     }
 
-    fn on(adapter: &wgpu::Adapter, checks: Checks) -> Result<Self, RenderError> {
-        Ok(Gpu { device: Device::open(adapter, checks)?, kernels: Mutex::default() })
+    /// How rays find triangles and meet them.
+    fn trace(&self) -> &'static str {
+        if self.device.ray_query { TRACE_QUERY } else { TRACE }
     }
 
     /// An entry point of a shader without constants.
@@ -97,7 +153,8 @@ impl Gpu {
     }
 
     /// An entry point of a shader, compiled when it is first used with these
-    /// values of its `override` constants.
+    /// values of its `override` constants. What traces rays is put before the
+    /// source.
     fn specialized(
         &self,
         source: &'static str,
@@ -110,16 +167,19 @@ impl Gpu {
             return Ok(kernel.clone());
         }
         let values: Vec<(&str, f64)> = key.2.iter().map(|&(name, value)| (name, f64::from(value))).collect();
-        let kernel = Arc::new(self.device.kernel(source, entry, &values)?);
+        let kernel = Arc::new(self.device.kernel(&[self.trace(), source].concat(), entry, &values)?);
         kernels.insert(key, kernel.clone());
         Ok(kernel)
     }
 
-    /// Adapter, driver and backend, for people.
+    /// Adapter, driver and backend, and what is not done as it usually is, for
+    /// people.
     pub fn describe(&self) -> String {
         let i = &self.device.info;
         let driver = [i.driver.as_str(), i.driver_info.as_str()].join(" ");
-        format!("{}, {} ({})", i.name, driver.trim(), i.backend)
+        let query = if self.device.ray_query { ", rays by ray query" } else { "" };
+        let raster = if self.options.g_buffer == GBufferBy::Raster { ", G-buffer by rasterisation" } else { "" };
+        format!("{}, {} ({}){query}{raster}", i.name, driver.trim(), i.backend)
     }
 
     /// Whether the adapter computes on the CPU, as Mesa's software driver does.

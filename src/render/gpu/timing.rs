@@ -97,21 +97,27 @@ impl LoadedGpu<'_> {
         let program = Program::new(&job.estimator)?;
         let images = self.take_images(job, &program)?;
         let seconds = self.gpu.device.guarded(|| {
-            let see = self.clocked(self.see_pieces(job).len(), |timer| self.see(job, &program, &images, timer))?;
-            let shade =
-                self.clocked(self.pieces(job, &program).len(), |timer| self.shade(job, &program, &images, timer))?;
+            let see = self.clocked(self.see_count(job, &images), |timer| self.see(job, &program, &images, timer))?;
+            let shade = self.clocked(self.pieces(job, &program).len() as u64, |timer| {
+                self.shade(job, &program, &images, timer);
+                Ok(())
+            })?;
             Ok([see, shade])
         });
         self.keep_images(images);
         seconds
     }
 
-    fn clocked(&self, dispatches: usize, work: impl Fn(Option<&Timer>)) -> Result<f64, RenderError> {
+    fn clocked(
+        &self,
+        submissions: u64,
+        work: impl Fn(Option<&Timer>) -> Result<(), RenderError>,
+    ) -> Result<f64, RenderError> {
         let device = &self.gpu.device;
-        let timer = Timer::new(device, dispatches as u64);
+        let timer = Timer::new(device, submissions);
         device.wait()?;
         let start = Instant::now();
-        work(timer.as_ref());
+        work(timer.as_ref())?;
         device.wait()?;
         let wall = start.elapsed().as_secs_f64();
         timer.map_or(Ok(wall), |t| Ok(t.seconds(device)?.iter().sum()))

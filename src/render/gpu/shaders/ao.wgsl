@@ -94,17 +94,15 @@ fn met(hit: Hit, direction: vec3<f32>) -> Surface {
     return Surface(point, hit.triangle, select(normal, -normal, dot(normal, direction) > 0.0), 0u);
 }
 
-@compute @workgroup_size(64)
-fn see(@builtin(global_invocation_id) id: vec3<u32>) {
-    let pixel = pixel_of(id.x);
-    if pixel == MISS {
-        return;
-    }
-    let x = f32(pixel % params.width) + 0.5;
-    let y = f32(pixel / params.width) + 0.5;
+// The ray of an image point: column and row, in pixels from the top left corner.
+fn view_ray(x: f32, y: f32) -> Ray {
     let origin = params.origin + params.origin_dx * x + params.origin_dy * y;
     let direction = normalize(params.direction + params.direction_dx * x + params.direction_dy * y);
-    let hit = walk(new_ray(origin, direction, FAR_AWAY), false, false);
+    return new_ray(origin, direction, FAR_AWAY);
+}
+
+// What a pixel sees where its ray has this hit; nothing else is known of it yet.
+fn begin(pixel: u32, hit: Hit, direction: vec3<f32>) {
     var surface = Surface(vec3<f32>(), MISS, vec3<f32>(), 0u);
     if hit.triangle != MISS {
         surface = met(hit, direction);
@@ -112,6 +110,16 @@ fn see(@builtin(global_invocation_id) id: vec3<u32>) {
     surfaces[pixel] = surface;
     sums[pixel] = 0.0;
     decisions[pixel] = Decisions(0u, 0u, 0u);
+}
+
+@compute @workgroup_size(64)
+fn see(@builtin(global_invocation_id) id: vec3<u32>) {
+    let pixel = pixel_of(id.x);
+    if pixel == MISS {
+        return;
+    }
+    let ray = view_ray(f32(pixel % params.width) + 0.5, f32(pixel / params.width) + 0.5);
+    begin(pixel, walk(ray, false, false), ray.direction);
 }
 
 fn tangents(n: vec3<f32>) -> array<vec3<f32>, 2> {
@@ -213,7 +221,16 @@ fn decide(root: u32, origin: vec3<f32>, normal: vec3<f32>, t: vec3<f32>, b: vec3
     return decided;
 }
 
-// Where all rays of a point stay. A secondary ray lies within R' of the middle of
+// Where all rays of a point stay: in a ball, and over its tangent plane no lower
+// than `floor_height`.
+struct Surroundings {
+    origin: vec3<f32>,
+    radius: f32,
+    normal: vec3<f32>,
+    floor_height: f32,
+}
+
+// A secondary ray lies within R' of the middle of
 // its primary, and at right angles to it. What lies lower than its origin by a
 // quarter of the offset lies in truth under it, and upward rays meet none of that;
 // secondary rays that the receiver closes do.

@@ -4,15 +4,6 @@
 // secondary ray, the first 1.3 are the same for all rays of a point, and a third of
 // the points has nothing near. The CPU has no twin of this: it changes no result.
 
-// Where all rays of a point stay: in a ball, and over its tangent plane no lower
-// than `floor_height`.
-struct Surroundings {
-    origin: vec3<f32>,
-    radius: f32,
-    normal: vec3<f32>,
-    floor_height: f32,
-}
-
 // Which of four slots touch the surroundings, as in `four_met`, but inner nodes in
 // the order of slots.
 fn four_near(s: Surroundings, p: vec3<f32>, size: vec3<f32>, lo: vec3<u32>, hi: vec3<u32>, meta_bytes: u32, inner: u32, first: u32) -> u32 {

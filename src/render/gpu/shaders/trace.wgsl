@@ -1,90 +1,10 @@
-// The tree, eight children a node, and the watertight triangle test. Twins:
-// trace/wide.rs with its tests, trace/triangle.rs.
+// The tree, eight children a node. Twin: trace/wide.rs with its tests.
 
 // Five words of four a node: see `WideNode`.
 @group(0) @binding(1) var<storage, read> nodes: array<vec4<u32>>;
-// Three corners a triangle, in the order of the tree's leaves; the first one's w is
-// the triangle's number in the scene. Nine floats a triangle took longer to load.
-@group(0) @binding(2) var<storage, read> triangles: array<vec4<u32>>;
 
 const STACK = 24u;
-const FAR_AWAY = 1e30;
-const MISS = 0xffffffffu;
 const ROOT = 0u;
-
-struct Ray {
-    origin: vec3<f32>,
-    direction: vec3<f32>,
-    inverse: vec3<f32>,
-    shear: vec3<f32>,
-    tmax: f32,
-    // The axis along which the direction is longest.
-    axis: u32,
-}
-
-struct Meeting {
-    met: bool,
-    t: f32,
-    weights: vec3<f32>,
-}
-
-struct Hit {
-    // MISS where nothing was hit.
-    triangle: u32,
-    t: f32,
-    weights: vec3<f32>,
-}
-
-fn bounded_reciprocal(x: f32) -> f32 {
-    return 1.0 / select(x, select(1e-20, -1e-20, x < 0.0), abs(x) < 1e-20);
-}
-
-// The axes in the order of the triangle test, the longest last.
-fn permute(v: vec3<f32>, axis: u32) -> vec3<f32> {
-    return select(select(v.xyz, v.zxy, axis == 1u), v.yzx, axis == 0u);
-}
-
-fn new_ray(origin: vec3<f32>, direction: vec3<f32>, tmax: f32) -> Ray {
-    let a = abs(direction);
-    let axis = select(select(2u, 1u, a.y > a.z), select(2u, 0u, a.x > a.z), a.x > a.y);
-    let d = permute(direction, axis);
-    let sz = 1.0 / d.z;
-    let inverse = vec3<f32>(
-        bounded_reciprocal(direction.x),
-        bounded_reciprocal(direction.y),
-        bounded_reciprocal(direction.z),
-    );
-    return Ray(origin, direction, inverse, vec3<f32>(d.x * sz, d.y * sz, sz), tmax, axis);
-}
-
-fn corner(triangle: u32, k: u32) -> vec3<f32> {
-    return bitcast<vec3<f32>>(triangles[triangle * 3u + k].xyz);
-}
-
-fn number(triangle: u32) -> u32 {
-    return triangles[triangle * 3u].w;
-}
-
-fn meets(ray: Ray, triangle: u32, tmax: f32) -> Meeting {
-    let a = permute(corner(triangle, 0u) - ray.origin, ray.axis);
-    let b = permute(corner(triangle, 1u) - ray.origin, ray.axis);
-    let c = permute(corner(triangle, 2u) - ray.origin, ray.axis);
-    let ax = a.x - ray.shear.x * a.z;
-    let ay = a.y - ray.shear.y * a.z;
-    let bx = b.x - ray.shear.x * b.z;
-    let by = b.y - ray.shear.y * b.z;
-    let cx = c.x - ray.shear.x * c.z;
-    let cy = c.y - ray.shear.y * c.z;
-    let u = cx * by - cy * bx;
-    let v = ax * cy - ay * cx;
-    let w = bx * ay - by * ax;
-    let det = u + v + w;
-    if ((u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0)) || det == 0.0 {
-        return Meeting(false, 0.0, vec3<f32>());
-    }
-    let t = ray.shear.z * (u * a.z + v * b.z + w * c.z) / det;
-    return Meeting(t > 0.0 && t <= tmax, t, vec3<f32>(u, v, w) / det);
-}
 
 // Entry or exit distances along one axis, of four slots.
 fn planes(bytes: u32, scale: f32, start: f32) -> vec4<f32> {
@@ -135,12 +55,6 @@ fn children_met(at: u32, corner_and_steps: vec4<u32>, metas: vec2<u32>, ray: Ray
     let inner = steps >> 24u;
     return four_met(g, vec3<u32>(a.x, a.z, b.x), vec3<u32>(b.z, c.x, c.z), metas.x, inner, 0u)
         | four_met(g, vec3<u32>(a.y, a.w, b.y), vec3<u32>(b.w, c.y, c.w), metas.y, inner, 4u);
-}
-
-// Whether a triangle turns its front against a ray of this direction.
-fn faces(triangle: u32, direction: vec3<f32>) -> bool {
-    let a = corner(triangle, 0u);
-    return dot(cross(corner(triangle, 1u) - a, corner(triangle, 2u) - a), direction) < 0.0;
 }
 
 // Of two triangles at one distance, the closest hit is the first in the scene,
