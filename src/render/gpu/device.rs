@@ -241,7 +241,8 @@ impl Device {
         }
     }
 
-    fn fits(&self, what: &'static str, needs: u64) -> Result<(), RenderError> {
+    /// Whether so many bytes fit into one binding.
+    pub fn fits(&self, what: &'static str, needs: u64) -> Result<(), RenderError> {
         let limits = self.device.limits();
         let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         if needs > limit {

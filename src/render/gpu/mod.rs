@@ -1,10 +1,13 @@
 //! The GPU renderer: compute shaders through wgpu, on hardware or on a software
 //! driver. Each WGSL stage stands beside its CPU twin under the same name.
 
+mod composite;
 mod device;
 mod loaded;
 mod params;
 mod timing;
+
+pub use composite::Lit;
 
 use super::{Geometry, Loaded, RenderError, Renderer};
 pub use device::Checks;

@@ -94,20 +94,26 @@ fn met(hit: Hit, direction: vec3<f32>) -> Surface {
     return Surface(point, hit.triangle, select(normal, -normal, dot(normal, direction) > 0.0), 0u);
 }
 
+// Through the centre of a pixel. Twin: View::ray.
+fn view_ray(pixel: u32) -> Ray {
+    let x = f32(pixel % params.width) + 0.5;
+    let y = f32(pixel / params.width) + 0.5;
+    let origin = params.origin + params.origin_dx * x + params.origin_dy * y;
+    let direction = normalize(params.direction + params.direction_dx * x + params.direction_dy * y);
+    return new_ray(origin, direction, FAR_AWAY);
+}
+
 @compute @workgroup_size(64)
 fn see(@builtin(global_invocation_id) id: vec3<u32>) {
     let pixel = pixel_of(id.x);
     if pixel == MISS {
         return;
     }
-    let x = f32(pixel % params.width) + 0.5;
-    let y = f32(pixel / params.width) + 0.5;
-    let origin = params.origin + params.origin_dx * x + params.origin_dy * y;
-    let direction = normalize(params.direction + params.direction_dx * x + params.direction_dy * y);
-    let hit = walk(new_ray(origin, direction, FAR_AWAY), false, false);
+    let ray = view_ray(pixel);
+    let hit = walk(ray, false, false);
     var surface = Surface(vec3<f32>(), MISS, vec3<f32>(), 0u);
     if hit.triangle != MISS {
-        surface = met(hit, direction);
+        surface = met(hit, ray.direction);
     }
     surfaces[pixel] = surface;
     sums[pixel] = 0.0;
