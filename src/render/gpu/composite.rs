@@ -209,9 +209,9 @@ impl Gpu {
                 (10, device.upload("texture coordinates", bytemuck::cast_slice(&skins))?),
                 (11, device.upload("materials", bytemuck::cast_slice(&materials_here))?),
                 (12, device.upload("textures", bytemuck::cast_slice(&all))?),
-                (13, device.uniform("srgb", &table)),
+                (13, device.uniform("srgb", &table)?),
                 (14, device.upload("lights", bytemuck::cast_slice(lamps))?),
-                (15, device.uniform("sky", &Backdrop::new(lighting))),
+                (15, device.uniform("sky", &Backdrop::new(lighting))?),
             ])
         })?;
         Ok(Lit { scene, buffers, lights: lamps.len() as u32, image: None })

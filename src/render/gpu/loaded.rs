@@ -87,7 +87,7 @@ impl<'a> LoadedGpu<'a> {
                 triangles: device.upload("triangles", bytemuck::cast_slice(&corners))?,
                 source,
                 materials: None,
-                params: device.uniform("params", &Params::zeroed()),
+                params: device.uniform("params", &Params::zeroed())?,
                 images: None,
             })
         })

@@ -1,17 +1,22 @@
 //! The GPU renderer: compute shaders through wgpu, on hardware or on a software
 //! driver. Each WGSL stage stands beside its CPU twin under the same name.
 
+mod adapter;
 mod composite;
 mod device;
 mod loaded;
 mod params;
+mod persistent;
+#[cfg(test)]
+pub(crate) mod tests;
 mod timing;
 
 pub use composite::Lit;
+pub use persistent::Persistent;
 
 use super::{Geometry, Loaded, RenderError, Renderer};
 pub use device::Checks;
-use device::{Device, Kernel};
+use device::{Device, Kernel, Setup};
 use loaded::LoadedGpu;
 use std::{
     collections::BTreeMap,
@@ -41,27 +46,13 @@ pub struct Gpu {
     device: Device,
     /// Those that were used.
     kernels: Mutex<BTreeMap<KernelKey, Arc<Kernel>>>,
-}
-
-/// The backends that aogauge computes on.
-fn backends() -> wgpu::Backends {
-    wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12
-}
-
-/// Hardware before software.
-fn preference(kind: wgpu::DeviceType) -> u32 {
-    match kind {
-        wgpu::DeviceType::DiscreteGpu => 0,
-        wgpu::DeviceType::IntegratedGpu => 1,
-        wgpu::DeviceType::VirtualGpu => 2,
-        wgpu::DeviceType::Other => 3,
-        wgpu::DeviceType::Cpu => 4,
-    }
+    /// How it was opened.
+    setup: Setup,
 }
 
 impl Gpu {
-    /// Opens the best adapter there is: hardware before software. Backends can be
-    /// narrowed by `WGPU_BACKEND`.
+    /// Opens the best adapter there is: hardware before software. `WGPU_BACKEND`
+    /// and `WGPU_ADAPTER_NAME` narrow the choice.
     ///
     /// # Errors
     /// [`RenderError::NoAdapter`] where there is none, [`RenderError::Device`]
@@ -75,23 +66,27 @@ impl Gpu {
     /// # Errors
     /// As [`Gpu::open`].
     pub fn open_with(checks: Checks) -> Result<Self, RenderError> {
-        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
-        descriptor.backends &= backends();
-        let backends = descriptor.backends;
-        let instance = wgpu::Instance::new(descriptor);
-        let mut adapters = pollster::block_on(instance.enumerate_adapters(backends));
-        adapters.sort_by_key(|a| preference(a.get_info().device_type));
-        let adapter = adapters.into_iter().next().ok_or_else(|| {
-            RenderError::NoAdapter(
-                "no Vulkan, Metal or DirectX 12 driver answers; on Debian, `apt-get install mesa-vulkan-drivers libvulkan1` gives a software one"
-                    .into(),
-            )
-        })?;
-        Self::on(&adapter, checks)
+        Self::with(Setup { checks, ..Setup::default() })
     }
 
-    fn on(adapter: &wgpu::Adapter, checks: Checks) -> Result<Self, RenderError> {
-        Ok(Gpu { device: Device::open(adapter, checks)?, kernels: Mutex::default() })
+    fn with(setup: Setup) -> Result<Self, RenderError> {
+        let adapter = adapter::best(setup.flags)?;
+        Ok(Gpu { device: Device::open(&adapter, &setup)?, kernels: Mutex::default(), setup })
+    }
+
+    /// The same adapter, opened anew.
+    fn again(&self) -> Result<Self, RenderError> {
+        let gpu = Self::with(self.setup.clone())?;
+        let (was, is) = (self.describe(), gpu.describe());
+        if was != is {
+            return Err(RenderError::Device(format!("{was} is gone; there is only {is}")));
+        }
+        Ok(gpu)
+    }
+
+    /// Whether the device is of no use any more.
+    fn is_lost(&self) -> bool {
+        self.device.is_lost()
     }
 
     /// An entry point of a shader without constants.
