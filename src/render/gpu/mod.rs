@@ -4,6 +4,7 @@
 mod adapter;
 mod composite;
 mod device;
+mod drivers;
 mod loaded;
 mod params;
 mod persistent;
@@ -11,7 +12,9 @@ mod persistent;
 pub(crate) mod tests;
 mod timing;
 
+pub use adapter::{Adapter, Features, Limits, survey};
 pub use composite::Lit;
+pub use drivers::{Maker, System};
 pub use persistent::Persistent;
 
 use super::{Geometry, Loaded, RenderError, Renderer};
