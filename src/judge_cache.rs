@@ -23,7 +23,7 @@ use std::{
 };
 
 /// Bytes that all files may take together.
-const MOST: u64 = 1 << 30;
+pub const MOST: u64 = 1 << 30;
 
 /// Attribute with the hash of all pixels.
 const PIXELS: &str = "pixels";
@@ -63,7 +63,12 @@ impl JudgeCache {
             let read = chunk.len();
             program.consume(read);
         }
-        Some(Self::new(dirs::cache_dir()?.join("aogauge").join("judge"), hex(&sha.finalize())))
+        Some(Self::new(Self::folder_of_user()?, hex(&sha.finalize())))
+    }
+
+    /// Where [`Self::of_user`] keeps its files.
+    pub fn folder_of_user() -> Option<PathBuf> {
+        Some(dirs::cache_dir()?.join("aogauge").join("judge"))
     }
 
     /// A cache in a folder, for a program known by a hash.
@@ -115,14 +120,7 @@ impl JudgeCache {
     /// Deletes the oldest files until the rest fits. Another process may do the
     /// same meanwhile, so that a file is gone is no error.
     fn prune(&self) {
-        let Ok(entries) = fs::read_dir(&self.folder) else {
-            return;
-        };
-        let mut files: Vec<(SystemTime, u64, PathBuf)> = entries
-            .flatten()
-            .filter(|e| e.path().extension().is_some_and(|x| x == "exr"))
-            .filter_map(|e| e.metadata().ok().and_then(|m| Some((m.modified().ok()?, m.len(), e.path()))))
-            .collect();
+        let mut files = files(&self.folder);
         files.sort();
         let mut total: u64 = files.iter().map(|(_, size, _)| size).sum();
         for (_, size, path) in files {
@@ -139,6 +137,19 @@ impl JudgeCache {
     pub fn folder(&self) -> &Path {
         &self.folder
     }
+}
+
+/// The files of a cache folder: when each was used last, its bytes, its path.
+fn files(folder: &Path) -> Vec<(SystemTime, u64, PathBuf)> {
+    let exr = |e: &fs::DirEntry| e.path().extension().is_some_and(|x| x == "exr");
+    let known = |e: fs::DirEntry| e.metadata().ok().and_then(|m| Some((m.modified().ok()?, m.len(), e.path())));
+    fs::read_dir(folder).into_iter().flatten().flatten().filter(exr).filter_map(known).collect()
+}
+
+/// How many files a cache folder has, and their bytes.
+pub fn usage(folder: &Path) -> (usize, u64) {
+    let files = files(folder);
+    (files.len(), files.iter().map(|(_, size, _)| size).sum())
 }
 
 fn name(side: usize, replicate: usize) -> String {
@@ -165,7 +176,10 @@ mod tests {
         let cache = JudgeCache::new(folder.path().join("judge"), "code".into());
         let key = Key { scene: "abc", paths: 16, seed: 1 };
         assert!(cache.load(&key, [3, 2]).is_empty());
+        assert_eq!(usage(cache.folder()), (0, 0));
         cache.store(&key, [3, 2], &pairs(3)).unwrap();
+        let size = fs::metadata(cache.path(&key)).unwrap().len();
+        assert_eq!(usage(cache.folder()), (1, size));
         let found = cache.load(&key, [3, 2]);
         assert_eq!(pixels(&found), pixels(&pairs(3)));
         assert!(found[0].with[4].is_nan());

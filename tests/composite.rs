@@ -2,12 +2,25 @@
 
 #![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
 
-use aogauge::{layers::Layers, picture::split};
+use aogauge::{
+    layers::Layers,
+    picture::split,
+    render::{
+        Geometry,
+        composite::{Lighting, Shaded, shade, sun},
+        gpu::Gpu,
+        materials::Materials,
+    },
+    scenes::{Light, LightKind, Material, Scene, Sky, Texture, View, Wrap, gltf, library},
+};
+use glam::{Vec2, Vec3};
 use image::RgbImage;
 use serde_json::Value;
 use std::{
+    fs,
     path::Path,
     process::{Command, Output},
+    sync::Arc,
 };
 
 fn aogauge(folder: &Path, args: &[&str]) -> Output {
@@ -108,7 +121,7 @@ fn pictures_repeat_whatever_the_threads() {
             .output()
             .unwrap();
         assert!(output.status.success());
-        std::fs::read(dir.path().join("t.exr")).unwrap()
+        fs::read(dir.path().join("t.exr")).unwrap()
     };
     assert!(bytes("1") == bytes("3"));
     let [a, b] = ["1", "2"].map(|seed| layers(dir.path(), &["--seed", seed]));
@@ -168,5 +181,140 @@ fn wrong_options_are_named() {
         assert_eq!(output.status.code(), Some(2), "{args:?}: {stderr}");
         assert!(stderr.contains(says), "{args:?}: {stderr}");
     }
-    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0, "nothing was written");
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0, "nothing was written");
+}
+
+/// A pixel by the CPU and by the GPU, the same to a thousandth.
+fn alike(a: &Shaded, b: &Shaded) -> bool {
+    let near = |a: Vec3, b: Vec3| (a - b).length() <= 1e-3 * a.length().max(b.length());
+    near(a.direct, b.direct)
+        && near(a.emission, b.emission)
+        && near(a.albedo, b.albedo)
+        && near(a.normal, b.normal)
+        && (a.depth - b.depth).abs() <= 1e-3 * a.depth.abs()
+}
+
+/// The GPU shades a view as the CPU does: at most 1 pixel in 10,000 differs.
+/// Returns what the CPU found.
+fn compare(gpu: &Gpu, what: &str, scene: &Scene, view: &View, lighting: &Lighting) -> Vec<Shaded> {
+    let geometry = Geometry::new(scene).unwrap();
+    let materials = Materials::new(scene);
+    let cpu = shade(&geometry, &materials, view, lighting);
+    let mut lit = gpu.lit(&geometry, &materials, lighting).unwrap();
+    let other = lit.shade(&View { resolution: [8, 8], ..*view }).unwrap();
+    assert_eq!(other.len(), 64);
+    let found = lit.shade(view).unwrap();
+    let parts = |s: &Shaded| (s.direct, s.depth, s.emission, s.albedo, s.normal);
+    assert!(found.iter().map(parts).eq(lit.shade(view).unwrap().iter().map(parts)), "{what}: once more, the same");
+    let differ = cpu.iter().zip(&found).filter(|(a, b)| !alike(a, b)).count();
+    println!("{what}: {differ} of {} pixels differ", cpu.len());
+    assert!(differ * 10_000 <= cpu.len(), "{what}: {differ} of {} pixels differ", cpu.len());
+    cpu
+}
+
+/// Sun, bulb and torch, and a sky of a gradient.
+fn lighting(at: Vec3, sky: Sky) -> Lighting {
+    let light = |kind, color, range| Light {
+        name: "l".into(),
+        kind,
+        position: at,
+        direction: Vec3::new(-0.48, -0.8, -0.36),
+        color,
+        intensity: 6.0,
+        range,
+    };
+    let spot = LightKind::Spot { inner: 0.3, outer: 0.7 };
+    let lights = vec![
+        light(LightKind::Point, [1.0, 0.6, 0.2], Some(2.5)),
+        light(spot, [0.3, 0.5, 1.0], None),
+        sun(97.0, 58.0, Vec3::new(5.0, 4.5, 4.0)),
+    ];
+    Lighting { lights, ambient: Vec3::new(0.5, 0.7, 1.0), sky }
+}
+
+#[test]
+fn the_gpu_lights_scenes_as_the_cpu_does() {
+    let gpu = Gpu::open().unwrap();
+    let gradient = Sky::Gradient { zenith: 1.0, horizon: 0.4, ground: 0.1 };
+    for (name, at) in [("curtain-arcade", Vec3::new(0.6, 0.9, 0.7)), ("pillar", Vec3::new(0.4, 0.6, 0.5))] {
+        let mut scene = library::scene(name).unwrap();
+        // All corners of the material model.
+        for (i, object) in scene.objects.iter_mut().enumerate() {
+            object.material = Material {
+                base_color: [0.9, 0.6, 0.3],
+                metallic: [0.0, 1.0, 0.4][i % 3],
+                roughness: [1.0, 0.3, 0.1][i % 3],
+                ..object.material.clone()
+            };
+        }
+        let view = scene.look.view();
+        let shaded = compare(&gpu, name, &scene, &view, &lighting(at, gradient));
+        let lit = shaded.iter().filter(|s| s.direct.x > 0.0).count();
+        assert!(lit * 5 > shaded.len() && shaded.iter().any(|s| s.depth > 0.0 && s.direct == Vec3::ZERO), "{name}");
+        let none = Lighting { lights: vec![], ..lighting(at, Sky::Uniform(2.0)) };
+        let small = View { resolution: [64, 64], ..view };
+        let dark = compare(&gpu, name, &scene, &small, &none);
+        assert!(dark.iter().all(|s| s.direct == Vec3::ZERO));
+        // More lights than one dispatch looks at.
+        let many = Lighting { lights: (0..30).flat_map(|_| lighting(at, gradient).lights).collect(), ..none };
+        let bright = compare(&gpu, name, &scene, &small, &many);
+        assert!(bright.iter().any(|s| s.direct.x > 1.0));
+    }
+}
+
+/// A curtain over open ground, each with a picture for every part of its
+/// material, every wrap among them, as a model in a glTF file.
+fn textured(folder: &Path) -> Scene {
+    let mut scene = library::scene("curtain-open").unwrap();
+    let texture = |size: [u32; 2], wrap: [Wrap; 2], seed: u32| {
+        let texel = |i: u32| [i * 37 + seed, i * i * 11 + seed, i * 101, 255].map(|v| 64 + (v % 192) as u8);
+        Some(Arc::new(Texture { size, wrap, texels: (0..size[0] * size[1]).map(texel).collect() }))
+    };
+    for (i, object) in scene.objects.iter_mut().enumerate() {
+        let place = |p: &Vec3| Vec2::new(p.x * 1.3 + p.y * 0.2, p.z * 0.9 + p.y * 0.7);
+        object.mesh.uvs = object.mesh.positions.iter().map(place).collect();
+        object.material = Material {
+            base_color: [0.9, 0.8, 0.7],
+            texture: texture([16, 8], [[Wrap::Repeat, Wrap::Mirror], [Wrap::Clamp, Wrap::Repeat]][i % 2], 3),
+            metallic: 0.5,
+            roughness: 0.9,
+            metallic_roughness_texture: texture([5, 7], [Wrap::Mirror, Wrap::Clamp], 50),
+            emissive: [0.2, 0.1, 0.3],
+            emissive_texture: texture([4, 4], [Wrap::Repeat; 2], 90 + i as u32),
+            ..object.material.clone()
+        };
+    }
+    let mut file = fs::File::create(folder.join("curtain.glb")).unwrap();
+    gltf::write_glb(&scene, &mut file).unwrap();
+    fs::write(folder.join("curtain.toml"), scene.model_toml("curtain.glb").unwrap()).unwrap();
+    Scene::from_file(&folder.join("curtain.toml")).unwrap()
+}
+
+#[test]
+fn the_gpu_reads_textures_as_the_cpu_does() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = textured(dir.path());
+    let gpu = Gpu::open().unwrap();
+    let lighting = lighting(Vec3::new(0.5, 0.8, 0.6), scene.environment.sky);
+    let shaded = compare(&gpu, "textured", &scene, &scene.look.view(), &lighting);
+    for value in [|s: &Shaded| s.albedo.x, |s: &Shaded| s.emission.y, |s: &Shaded| s.direct.z] {
+        let values: Vec<f32> = shaded.iter().filter(|s| s.depth > 0.0).map(value).collect();
+        let (least, most) = values.iter().fold((f32::MAX, f32::MIN), |(a, b), &v| (a.min(v), b.max(v)));
+        assert!(most > 1.5 * least && most > 0.01, "textures must show: {least} {most}");
+    }
+}
+
+/// From outside: the same picture whoever renders it.
+#[test]
+fn the_gpu_composes_the_same_picture() {
+    let dir = tempfile::tempdir().unwrap();
+    let options = ["--sun-irradiance", "8", "--exposure", "0"];
+    let cpu = layers(dir.path(), &options);
+    let gpu = layers(dir.path(), &[&options[..], &["--renderer", "gpu"]].concat());
+    for name in ["color.R", "direct.G", "ambient.B", "emission.R", "ao", "albedo.G", "depth"] {
+        let (a, b) = (cpu.get(name).unwrap(), gpu.get(name).unwrap());
+        let differ = a.iter().zip(b).filter(|(a, b)| (*a - *b).abs() > 1e-3 * a.abs()).count();
+        // A pixel has four samples, each of which may decide otherwise.
+        assert!(differ * 2_500 <= a.len(), "{name}: {differ} of {} pixels differ", a.len());
+    }
 }

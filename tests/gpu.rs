@@ -5,8 +5,8 @@
 
 use aogauge::{
     render::{
-        Estimator, Extension, Faces, Falloff, Frame, Geometry, Job, LocalIndirect, Openness, ReceiverPlane, Renderer,
-        Scale, SecondaryOrigin, Sides, cpu::Cpu, gpu::Checks, gpu::Gpu, gpu::Options,
+        Estimator, Extension, Faces, Falloff, Frame, Geometry, Job, LocalIndirect, Openness, ReceiverPlane,
+        RenderError, Renderer, Scale, SecondaryOrigin, Sides, cpu::Cpu, gpu::Checks, gpu::Gpu, gpu::Options,
     },
     scenes::{AoScale, Scene, View, library},
 };
@@ -221,6 +221,21 @@ fn checks_change_nothing() {
         })
     });
     assert_eq!(images[0], images[1]);
+}
+
+/// A view whose image no adapter takes in one binding is refused before anything
+/// of it is made, and the next one is rendered.
+#[test]
+fn views_beyond_a_binding_are_refused() {
+    let gpu = gpu();
+    let scene = library::scene("plane").unwrap();
+    let geometry = Geometry::new(&scene).unwrap();
+    let mut loaded = gpu.load(&geometry).unwrap();
+    let view = View { resolution: [65_535, 65_535], ..scene.measure.view() };
+    let job = Job { view: &view, estimator: ESTIMATORS[0], ao: scene.ao, rays: 1, seed: 1, replicate: 0 };
+    let error = loaded.render(&job).unwrap_err();
+    assert!(matches!(error, RenderError::TooLarge { what: "surfaces", .. }), "{error}");
+    assert!(loaded.render(&Job { view: &scene.measure.view(), ..job }).is_ok());
 }
 
 /// Same adapter, same job, same bits; and a change of view size in between.

@@ -35,6 +35,6 @@ pub use light::{Light, LightKind};
 pub use material::{MAX_ALBEDO, Material, luminance};
 pub use mesh::{Mesh, MeshError, clip, closest_point};
 pub use scene::{AoScale, Object, Scene};
-pub use texture::{Texture, Wrap};
+pub use texture::{Texture, Wrap, srgb};
 pub use view::{LookView, MeasureView, View, WorldToImage};
 pub use views_json::views_json;

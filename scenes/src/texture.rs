@@ -65,6 +65,7 @@ impl Texture {
         self.between(uv, linear)
     }
 
+    /// Twin: `between` of `gpu/shaders/materials.wgsl`, in single precision.
     fn between(&self, uv: Vec2, decode: fn(u8) -> f64) -> Vec3 {
         let [w, h] = self.size;
         let uv = if uv.is_finite() { uv } else { Vec2::ZERO };
@@ -91,8 +92,8 @@ impl Texture {
     }
 }
 
-/// Linear light of an sRGB byte.
-pub(crate) fn srgb(byte: u8) -> f64 {
+/// Linear light of an sRGB byte, 0 to 1.
+pub fn srgb(byte: u8) -> f64 {
     static TABLE: LazyLock<[f64; 256]> = LazyLock::new(|| {
         std::array::from_fn(|i| {
             let v = i as f64 / 255.0;

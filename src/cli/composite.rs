@@ -350,8 +350,13 @@ fn composite(
     let methods: Vec<Option<Estimator>> = methods.iter().map(|(_, e)| *e).collect();
     let what =
         Composition { view, methods: &methods, ao: scene.ao, rays, samples: args.samples, seed: args.method.seed };
-    compose(&mut *loaded, &what, lighting.ambient, |view| Ok(shade(&geometry, &materials, view, lighting)))
-        .map_err(fail)
+    let picture = match &gpu {
+        None => compose(&mut *loaded, &what, lighting.ambient, |view| Ok(shade(&geometry, &materials, view, lighting))),
+        Some(gpu) => gpu
+            .lit(&geometry, &materials, lighting)
+            .and_then(|mut lit| compose(&mut *loaded, &what, lighting.ambient, |view| lit.shade(view))),
+    };
+    picture.map_err(fail)
 }
 
 /// Radiance by ambient light that nothing keeps off.

@@ -4,7 +4,7 @@ use super::Failure;
 use crate::render::gpu::{GBufferBy, Options, Traversal};
 
 /// For the GPU only.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Default, clap::Args)]
 pub(super) struct OnGpu {
     /// How the GPU finds what each pixel sees; rays unless given.
     #[arg(long, value_enum)]

@@ -4,7 +4,11 @@ use super::{Exit, Failure, Format, json, on_gpu::OnGpu, print, tell};
 use crate::{
     judge_cache::JudgeCache,
     record::{Machine, Record, RecordFolder},
-    render::{Renderer, cpu::Cpu, gpu::Gpu},
+    render::{
+        Renderer,
+        cpu::Cpu,
+        gpu::{Gpu, Persistent},
+    },
     report,
     run::{Observer, Prepared},
     suite::{Plan, Platform, Suite},
@@ -91,7 +95,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
         pool = pool.num_threads(threads.into());
     }
     let pool = pool.build().map_err(|e| Failure::usage(format!("cannot start {:?} threads: {e}", args.threads)))?;
-    let (record, folder) = pool.install(|| render(args, &suite, gpu.as_ref(), &missing))?;
+    let (record, folder) = pool.install(|| render(args, &suite, gpu, &missing))?;
     report::write(folder.path(), folder.path())?;
     tell(&format!(
         "{}\n{}\n{}: {}",
@@ -111,18 +115,23 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
 }
 
 /// Checks everything, then makes the folder, then renders.
-fn render(args: &Args, suite: &Suite, gpu: Option<&Gpu>, missing: &str) -> Result<(Record, RecordFolder), Failure> {
-    let platform = match gpu {
+fn render(args: &Args, suite: &Suite, gpu: Option<Gpu>, missing: &str) -> Result<(Record, RecordFolder), Failure> {
+    let platform = match &gpu {
         None => Platform::Cpu,
         Some(gpu) if gpu.is_software() && args.renderer == Choice::Auto => Platform::SoftwareGpu,
         Some(_) => Platform::Gpu,
     };
     let plan = Plan::new(suite, platform, args.seed);
-    let machine = Machine::here(gpu.map_or_else(|| missing.to_owned(), Gpu::describe), gpu.map(Gpu::is_software));
+    let machine = Machine::here(
+        gpu.as_ref().map_or_else(|| missing.to_owned(), Gpu::describe),
+        gpu.as_ref().map(Gpu::is_software),
+    );
+    let gpu = gpu.map(Persistent::new);
     let prepared = Prepared::new(&plan)?;
     let folder = RecordFolder::create(&args.out)?;
     let cache = if args.no_cache { None } else { JudgeCache::of_user() };
-    let record = prepared.run(&Cpu, gpu.map(|g| g as &dyn Renderer), cache.as_ref(), machine, &folder, &bar())?;
+    let record =
+        prepared.run(&Cpu, gpu.as_ref().map(|g| g as &dyn Renderer), cache.as_ref(), machine, &folder, &bar())?;
     if let Some(trouble) = &record.timing.cache_trouble {
         tell(&format!("aogauge: the judge's images are not kept for the next run: {trouble}"));
     }
@@ -157,5 +166,60 @@ fn exit(record: &Record) -> Exit {
         Exit::Inconclusive
     } else {
         Exit::Pass
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::gpu::tests::losing;
+    use std::path::Path;
+
+    /// A device is lost while the second of four GPU cases is rendered.
+    #[test]
+    fn a_lost_device_costs_one_case_and_exit_code_5() {
+        let text = r#"
+description = "x"
+scenes = ["plane"]
+rays = [4, 8]
+replicates = 2
+converged_rays = 32
+look_rays = 1
+[[estimator]]
+name = "classic"
+kind = "classic"
+[[estimator]]
+name = "extended"
+kind = "extended"
+receiver_plane = "clipped"
+[[gate]]
+name = "same"
+metric = "renderer-difference"
+renderers = ["gpu"]
+equals = 0.0
+within = 0.001
+"#;
+        let suite = Suite::from_toml("x", "x.toml", text, Path::new(".")).unwrap();
+        let dir = tempfile::tempdir().unwrap();
+        let args = Args {
+            suite: String::new(),
+            out: dir.path().join("out"),
+            seed: None,
+            renderer: Choice::Gpu,
+            threads: None,
+            no_cache: true,
+            on_gpu: OnGpu::default(),
+            format: Format::Text,
+        };
+        // The first case loads, compiles and runs by then.
+        let (_, folder) = render(&args, &suite, Some(losing([9])), "").unwrap();
+        let record = Record::read(folder.path()).unwrap();
+        let failed: Vec<_> = record.cases.iter().filter(|c| c.error.is_some()).collect();
+        assert!(failed.len() == 1 && failed[0].case.renderer == "gpu", "{failed:?}");
+        assert!(failed[0].error.as_deref().unwrap().contains("the device was lost"), "{:?}", failed[0].error);
+        let whole = record.cases.iter().filter(|c| c.image.is_some() && !c.metrics.is_empty()).count();
+        assert_eq!((whole, record.summary.cases, record.summary.pass), (7, 8, 3));
+        assert_eq!(exit(&record), Exit::Incomplete);
+        assert_eq!(Exit::Incomplete as i32, 5);
     }
 }

@@ -165,7 +165,8 @@ fn area([a, b, c]: &[Vec3; 3]) -> f32 {
 
 /// What a punctual light sends to a point, without obstacles, as
 /// KHR_lights_punctual has it: inverse square, windowed by the range where there
-/// is one; a spot falls off between its two angles.
+/// is one; a spot falls off between its two angles. Twin: `arrival` of
+/// `gpu/shaders/lights.wgsl`.
 pub fn arrival(light: &Light, point: Vec3) -> Option<Arrival> {
     let intensity = Vec3::from(light.color) * light.intensity;
     if light.kind == LightKind::Directional {

@@ -1,4 +1,5 @@
 //! What a surface is made of at a point: factors times textures, as glTF has it.
+//! Twin: `gpu/shaders/materials.wgsl`.
 
 use super::gbuffer::Surface;
 use aogauge_scenes::{Object, Scene};
@@ -47,14 +48,25 @@ impl<'a> Materials<'a> {
         Materials { objects: &scene.objects, first }
     }
 
+    /// The objects of the scene.
+    pub(super) fn objects(&self) -> &'a [Object] {
+        self.objects
+    }
+
+    /// Which object a triangle of the scene belongs to, and its number there.
+    pub(super) fn place(&self, triangle: u32) -> (usize, usize) {
+        let triangle = triangle as usize;
+        let object = self.first.partition_point(|&f| f <= triangle).saturating_sub(1);
+        (object, triangle - self.first[object])
+    }
+
     /// The material at a point that a view of the scene sees.
     pub fn at(&self, surface: &Surface) -> Here {
-        let triangle = surface.triangle as usize;
-        let index = self.first.partition_point(|&f| f <= triangle).saturating_sub(1);
-        let object = &self.objects[index];
+        let (object, triangle) = self.place(surface.triangle);
+        let object = &self.objects[object];
         let m = &object.material;
         let textured = m.textures().iter().any(Option::is_some);
-        let uv = textured.then(|| uv(object, triangle - self.first[index], surface.point)).flatten();
+        let uv = textured.then(|| uv(object, triangle, surface.point)).flatten();
         let [color, metal_rough, emission] = m.textures().map(|t| t.zip(uv));
         let [_, roughness, metallic] = metal_rough.map_or([1.0; 3], |(t, uv)| t.shares(uv).to_array());
         Here {
@@ -73,10 +85,15 @@ fn uv(object: &Object, triangle: usize, point: Vec3) -> Option<Vec2> {
     let [a, b, c] = corners.map(|i| object.mesh.positions[i]);
     let (n, p) = ((b - a).cross(c - a), point - a);
     let (v, w) = (p.cross(c - a).dot(n), (b - a).cross(p).dot(n));
-    let [ta, tb, tc]: [Option<&Vec2>; 3] = corners.map(|i| object.mesh.uvs.get(i));
-    let (ta, tb, tc) = (*ta?, *tb?, *tc?);
+    let [ta, tb, tc] = corner_uvs(object, triangle)?;
     let uv = ta + ((tb - ta) * v + (tc - ta) * w) / n.length_squared();
     uv.is_finite().then_some(uv)
+}
+
+/// Texture coordinates at the corners of a triangle.
+pub(super) fn corner_uvs(object: &Object, triangle: usize) -> Option<[Vec2; 3]> {
+    let [a, b, c] = object.mesh.triangles.get(triangle)?.map(|i| object.mesh.uvs.get(i as usize));
+    Some([*a?, *b?, *c?])
 }
 
 #[cfg(test)]

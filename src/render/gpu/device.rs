@@ -1,32 +1,83 @@
 //! A thin layer over wgpu: one device, kernels, buffers, and dispatches whose
 //! errors come back as results.
 
+use super::Options;
 use crate::render::RenderError;
 use bytemuck::Pod;
 use std::{
-    sync::{Arc, Mutex},
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
     time::Duration,
 };
-use wgpu::util::DeviceExt;
 
 /// Threads of a workgroup, as every kernel says.
 pub(super) const WORKGROUP: u32 = 64;
 
-/// A device that has not finished by then counts as hung.
-const PATIENCE: Duration = Duration::from_secs(120);
+/// How a device is opened. Tests narrow it.
+#[derive(Clone, Debug)]
+pub(super) struct Setup {
+    pub options: Options,
+    pub flags: wgpu::InstanceFlags,
+    /// Bytes of one binding at most, whatever the adapter takes.
+    pub largest_binding: u64,
+    /// A device that has not finished by then counts as hung.
+    pub patience: Duration,
+    #[cfg(test)]
+    pub fuse: Option<Arc<super::tests::Fuse>>,
+}
+
+impl Default for Setup {
+    fn default() -> Self {
+        Setup {
+            options: Options::default(),
+            flags: wgpu::InstanceFlags::empty(),
+            largest_binding: u64::MAX,
+            patience: Duration::from_secs(120),
+            #[cfg(test)]
+            fuse: None,
+        }
+    }
+}
 
 /// An opened adapter.
 pub(super) struct Device {
     pub info: wgpu::AdapterInfo,
-    checks: Checks,
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
     /// Whether shaders may use ray query.
     pub ray_query: bool,
     /// Nanoseconds a tick, where the device has timestamp queries.
     tick: Option<f32>,
-    /// What went wrong outside an error scope: a lost device, a driver's refusal.
-    trouble: Arc<Mutex<Option<String>>>,
+    trouble: Arc<Trouble>,
+    setup: Setup,
+}
+
+/// What went wrong outside an error scope: a lost device, a driver's refusal.
+#[derive(Default)]
+struct Trouble {
+    message: Mutex<Option<String>>,
+    /// Once and for all.
+    lost: AtomicBool,
+}
+
+impl Trouble {
+    fn note(&self, message: String) {
+        self.message.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(message);
+    }
+
+    fn lose(&self, message: String) {
+        self.note(message);
+        self.lost.store(true, Ordering::Release);
+    }
+
+    /// What there is; that a device is lost is told for ever.
+    fn told(&self) -> Option<String> {
+        let mut message = self.message.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.lost.load(Ordering::Acquire) { message.clone() } else { message.take() }
+    }
 }
 
 /// Whether shaders check every index and bound every loop at run time.
@@ -47,10 +98,11 @@ pub(super) struct Kernel {
 impl Device {
     /// Opens an adapter with the largest buffers it has, and with ray query where
     /// that is asked for.
-    pub fn open(adapter: &wgpu::Adapter, checks: Checks, ray_query: bool) -> Result<Self, RenderError> {
+    pub fn open(adapter: &wgpu::Adapter, setup: &Setup, ray_query: bool) -> Result<Self, RenderError> {
         let has = adapter.limits();
+        let info = adapter.get_info();
         let mut required_limits = wgpu::Limits {
-            max_storage_buffer_binding_size: has.max_storage_buffer_binding_size,
+            max_storage_buffer_binding_size: has.max_storage_buffer_binding_size.min(setup.largest_binding),
             max_buffer_size: has.max_buffer_size,
             max_texture_dimension_2d: has.max_texture_dimension_2d,
             ..wgpu::Limits::default()
@@ -76,23 +128,20 @@ impl Device {
             experimental_features,
             ..wgpu::DeviceDescriptor::default()
         }))
-        .map_err(|e| RenderError::Device(e.to_string()))?;
-        let trouble = Arc::new(Mutex::new(None));
-        let note = trouble.clone();
-        let put = move |message: String| {
-            if let Ok(mut slot) = note.lock() {
-                slot.get_or_insert(message);
-            }
-        };
-        let lost = put.clone();
-        device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| put(e.to_string())));
-        device.set_device_lost_callback(move |reason, message| {
-            if reason != wgpu::DeviceLostReason::Destroyed {
-                lost(format!("the device was lost: {message}"));
-            }
+        .map_err(|e| RenderError::Device(format!("{} cannot be opened: {e}", info.name)))?;
+        let trouble = Arc::new(Trouble::default());
+        let (uncaptured, lost) = (trouble.clone(), trouble.clone());
+        device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| uncaptured.note(in_a_line(&e.to_string()))));
+        device.set_device_lost_callback(move |_, message| {
+            lost.lose(["the device was lost", message.trim()].join(" ").trim().to_owned());
         });
         let tick = (!timestamps.is_empty()).then(|| queue.get_timestamp_period());
-        Ok(Device { info: adapter.get_info(), checks, device, queue, ray_query, tick, trouble })
+        Ok(Device { info, device, queue, ray_query, tick, trouble, setup: setup.clone() })
+    }
+
+    /// Whether the device is of no use any more.
+    pub fn is_lost(&self) -> bool {
+        self.trouble.lost.load(Ordering::Acquire)
     }
 
     /// Whether the adapter computes on the CPU, as Mesa's software driver does.
@@ -104,12 +153,13 @@ impl Device {
     pub fn module(&self, label: &str, source: &str) -> wgpu::ShaderModule {
         let descriptor =
             wgpu::ShaderModuleDescriptor { label: Some(label), source: wgpu::ShaderSource::Wgsl(source.into()) };
-        match self.checks {
+        match self.setup.options.checks {
             Checks::On => self.device.create_shader_module(descriptor),
             // SAFETY: all indices of our shaders come from what this program
-            // uploads (nodes and triangles of one tree, pixels of images that are
-            // as large as the dispatch says), and loops end with the tree, whose
-            // depth is checked against the stack. Tested by `checks_change_nothing`
+            // uploads (nodes and triangles of one tree, texels of whole textures,
+            // pixels of images that are as large as the dispatch says), and loops
+            // end with the rays, the lights or the tree, whose depth is checked
+            // against the stack. Tested by `checks_change_nothing`
             // in tests/gpu.rs, which renders the same with every check on.
             Checks::Off => unsafe {
                 self.device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked())
@@ -153,20 +203,28 @@ impl Device {
         self.fits(label, contents.len() as u64)?;
         // What a driver's tree is built of.
         let input = if self.ray_query { wgpu::BufferUsages::BLAS_INPUT } else { wgpu::BufferUsages::empty() };
-        Ok(self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some(label),
-            contents,
-            usage: wgpu::BufferUsages::STORAGE | input,
-        }))
+        self.filled(label, contents, wgpu::BufferUsages::STORAGE | input)
     }
 
     /// A uniform buffer.
-    pub fn uniform<T: Pod>(&self, label: &'static str, value: &T) -> wgpu::Buffer {
-        self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+    pub fn uniform<T: Pod>(&self, label: &'static str, value: &T) -> Result<wgpu::Buffer, RenderError> {
+        self.filled(label, bytemuck::bytes_of(value), wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST)
+    }
+
+    /// A buffer with contents, some words of four bytes. wgpu's own helper panics
+    /// where the memory does not suffice.
+    fn filled(&self, label: &str, contents: &[u8], usage: wgpu::BufferUsages) -> Result<wgpu::Buffer, RenderError> {
+        let size = contents.len() as u64;
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
-            contents: bytemuck::bytes_of(value),
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-        })
+            size,
+            usage,
+            mapped_at_creation: true,
+        });
+        let refused = |e: wgpu::MapRangeError| RenderError::Device(format!("no memory for the {label}: {e}"));
+        buffer.get_mapped_range_mut(..).map_err(refused)?.slice(..).copy_from_slice(contents);
+        buffer.unmap();
+        Ok(buffer)
     }
 
     /// Gives a kernel its buffers, and what else it has bound: exactly those that
@@ -208,10 +266,12 @@ impl Device {
 
     /// Waits until all that was submitted has run.
     pub fn wait(&self) -> Result<(), RenderError> {
-        self.device
-            .poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) })
-            .map_err(|e| RenderError::Device(e.to_string()))?;
-        self.check()
+        let waited = wgpu::PollType::Wait { submission_index: None, timeout: Some(self.setup.patience) };
+        match self.device.poll(waited) {
+            Err(wgpu::PollError::Timeout) => Err(self.abandon()),
+            Err(e) => Err(RenderError::Device(e.to_string())),
+            Ok(_) => self.check(),
+        }
     }
 
     /// Times by the CPU's clock from now on.
@@ -245,33 +305,61 @@ impl Device {
         match receiver.try_recv() {
             Ok(Ok(())) => {}
             Ok(Err(e)) => return Err(device_error(&e)),
-            Err(_) => return Err(RenderError::Device(format!("it did not finish within {} s", PATIENCE.as_secs()))),
+            Err(_) => return Err(self.abandon()),
         }
         let mapped = staging.slice(..).get_mapped_range().map_err(|e| device_error(&e))?;
         Ok(bytemuck::pod_collect_to_vec(&mapped))
     }
 
+    /// Gives a hung device up. It is never closed: that would wait for it.
+    fn abandon(&self) -> RenderError {
+        std::mem::forget((self.device.clone(), self.queue.clone()));
+        self.trouble.lose(format!("it did not finish within {} s", self.setup.patience.as_secs()));
+        self.check().err().unwrap_or_else(|| RenderError::Device("it hangs".into()))
+    }
+
     /// Runs `work` with the device's errors caught, and returns the first of them.
+    ///
+    /// wgpu panics where a driver loses the device while it is waited for. Then,
+    /// too, the device counts as lost, and the program goes on.
     pub fn guarded<T>(&self, work: impl FnOnce() -> Result<T, RenderError>) -> Result<T, RenderError> {
+        self.check()?;
+        #[cfg(test)]
+        self.burn();
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let result = work();
+        let result = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+            let said = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
+            let message = said.unwrap_or("the driver failed");
+            self.trouble.lose(in_a_line(message));
+            self.check().and(Err(RenderError::Device(in_a_line(message))))
+        });
         let errors = [pollster::block_on(validation.pop()), pollster::block_on(memory.pop())];
-        if let Some(e) = errors.into_iter().flatten().next() {
-            return Err(RenderError::Device(e.to_string()));
-        }
         self.check()?;
+        if let Some(e) = errors.into_iter().flatten().next() {
+            return Err(RenderError::Device(match e {
+                wgpu::Error::OutOfMemory { .. } => "its memory does not suffice for this scene and view".into(),
+                other => in_a_line(&other.to_string()),
+            }));
+        }
         result
     }
 
     fn check(&self) -> Result<(), RenderError> {
-        match self.trouble.lock().ok().and_then(|mut slot| slot.take()) {
-            Some(message) => Err(RenderError::Device(message)),
-            None => Ok(()),
+        self.trouble.told().map_or(Ok(()), |message| Err(RenderError::Device(message)))
+    }
+
+    /// Loses the device where a test asks for it.
+    #[cfg(test)]
+    fn burn(&self) {
+        if self.setup.fuse.as_ref().is_some_and(|fuse| fuse.burns()) {
+            self.device.destroy();
+            self.device.poll(wgpu::PollType::Poll).unwrap();
         }
     }
 
-    fn fits(&self, what: &'static str, needs: u64) -> Result<(), RenderError> {
+    /// Whether so many bytes fit into one binding.
+    pub fn fits(&self, what: &'static str, needs: u64) -> Result<(), RenderError> {
         let limits = self.device.limits();
         let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         if needs > limit {
@@ -279,6 +367,11 @@ impl Device {
         }
         Ok(())
     }
+}
+
+/// wgpu's messages, in one line.
+fn in_a_line(message: &str) -> String {
+    message.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// Bytes of a pair of timestamps.

@@ -23,7 +23,7 @@ const RAYS_SOFTWARE: u64 = 1 << 19;
 const RAYS_HARDWARE: u64 = 1 << 23;
 
 /// What the shader writes where its loops were stopped early.
-const STOPPED: f32 = -1.0;
+pub(super) const STOPPED: f32 = -1.0;
 
 /// `Surface` of ao.wgsl.
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -50,9 +50,9 @@ pub(super) struct Images {
 }
 
 /// A kernel with its buffers.
-struct Bound {
-    kernel: Arc<Kernel>,
-    group: wgpu::BindGroup,
+pub(super) struct Bound {
+    pub kernel: Arc<Kernel>,
+    pub group: wgpu::BindGroup,
 }
 
 /// What rays find triangles by.
@@ -70,7 +70,7 @@ pub(super) struct LoadedGpu<'a> {
     tree: Tree,
     triangles: wgpu::Buffer,
     /// How each triangle of the buffer was numbered in the scene.
-    source: Vec<u32>,
+    pub source: Vec<u32>,
     /// Albedo and emission of each triangle, once a stage asks for them.
     materials: Option<wgpu::Buffer>,
     params: wgpu::Buffer,
@@ -105,19 +105,24 @@ impl<'a> LoadedGpu<'a> {
                 triangles,
                 source,
                 materials: None,
-                params: device.uniform("params", &Params::zeroed()),
+                params: device.uniform("params", &Params::zeroed())?,
                 images: None,
             })
         })
     }
 
     /// What rays are traced against, with the bindings that the shaders give it.
-    fn tracing(&self) -> [(u32, wgpu::BindingResource<'_>); 2] {
+    pub fn tracing(&self) -> [(u32, wgpu::BindingResource<'_>); 2] {
         let tree = match &self.tree {
             Tree::Nodes(nodes) => nodes.as_entire_binding(),
             Tree::Query(tlas) => tlas.as_binding(),
         };
         [(1, tree), (2, self.triangles.as_entire_binding())]
+    }
+
+    /// What [`Self::dispatch`] tells kernels, with its binding.
+    pub fn told(&self) -> (u32, wgpu::BindingResource<'_>) {
+        (0, self.params.as_entire_binding())
     }
 
     /// Albedo, then emission, of each triangle in leaf order.
@@ -160,7 +165,7 @@ impl<'a> LoadedGpu<'a> {
         let surfaces = buffer("surfaces", size_of::<Surface>())?;
         let sums = buffer("sums", size_of::<f32>() * stage.channels() as usize)?;
         let decisions = buffer("decisions", size_of::<Decisions>())?;
-        let (raster, see) = match self.gpu.options.g_buffer {
+        let (raster, see) = match self.gpu.setup.options.g_buffer {
             GBufferBy::Rays => {
                 (None, self.bound(self.gpu.kernel(SHADER, "see")?, &surfaces, &sums, Some((5, &decisions))))
             }
@@ -235,8 +240,9 @@ impl<'a> LoadedGpu<'a> {
         self.dispatch(job, program, &images.shade, pieces, timer.map(|t| (t, 0)));
     }
 
-    /// A timer comes with the slot of the first piece.
-    fn dispatch(
+    /// Runs a kernel over pieces of a job, each a submission of its own. A timer
+    /// comes with the slot of the first piece.
+    pub(super) fn dispatch(
         &self,
         job: &Job<'_>,
         program: &Program,
@@ -267,7 +273,7 @@ impl<'a> LoadedGpu<'a> {
         pieces(places(job.view.resolution), job.rays, program.rays_an_invocation(), self.budget())
     }
 
-    fn budget(&self) -> u64 {
+    pub fn budget(&self) -> u64 {
         if self.gpu.is_software() { RAYS_SOFTWARE } else { RAYS_HARDWARE }
     }
 }
@@ -286,9 +292,7 @@ impl Loaded for LoadedGpu<'_> {
             let sums: Vec<f32> = self.gpu.device.read(&images.sums)?;
             let wall = start.elapsed().as_secs_f64();
             if sums.contains(&STOPPED) {
-                return Err(RenderError::Device(
-                    "the driver stopped a loop of the shader early: the scene is too deep for it".into(),
-                ));
+                return Err(stopped());
             }
             let surfaces: Vec<Surface> = self.gpu.device.read(&images.surfaces)?;
             let decisions = self.gpu.device.read(&images.decisions)?;
@@ -328,12 +332,17 @@ fn finished(program: &Program, sums: &[f32], surfaces: &[Surface], rays: u32) ->
     (colors.iter().map(|&c| luminance(c)).collect(), Some(colors))
 }
 
+/// What [`STOPPED`] means.
+pub(super) fn stopped() -> RenderError {
+    RenderError::Device("the driver stopped a loop of the shader early: the scene is too deep for it".into())
+}
+
 /// A range of places in tile order and a range of rays.
 pub(super) type Piece = (std::ops::Range<u32>, std::ops::Range<u32>);
 
 /// Splits a job so that no piece has more than `budget` rays, and no invocation
 /// more than `most`.
-fn pieces(places: u32, rays: u32, most: u32, budget: u64) -> Vec<Piece> {
+pub(super) fn pieces(places: u32, rays: u32, most: u32, budget: u64) -> Vec<Piece> {
     let ray_step = rays.clamp(1, most);
     // Whole workgroups, at most 65,535 a dispatch.
     let groups = (budget / u64::from(ray_step * WORKGROUP)).clamp(1, 65_535) as u32;

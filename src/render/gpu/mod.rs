@@ -1,16 +1,27 @@
 //! The GPU renderer: compute shaders through wgpu, on hardware or on a software
 //! driver. Each WGSL stage stands beside its CPU twin under the same name.
 
+mod adapter;
+mod composite;
 mod device;
+mod drivers;
 mod loaded;
 mod params;
+mod persistent;
 mod query;
 mod raster;
+#[cfg(test)]
+pub(crate) mod tests;
 mod timing;
+
+pub use adapter::{Adapter, Features, Limits, survey};
+pub use composite::Lit;
+pub use drivers::{Maker, System};
+pub use persistent::Persistent;
 
 use super::{Geometry, Loaded, RenderError, Renderer};
 pub use device::Checks;
-use device::{Device, Kernel};
+use device::{Device, Kernel, Setup};
 use loaded::LoadedGpu;
 use std::{
     collections::BTreeMap,
@@ -80,25 +91,10 @@ pub struct Options {
 /// A device with its kernels.
 pub struct Gpu {
     device: Device,
-    options: Options,
     /// Those that were used.
     kernels: Mutex<BTreeMap<KernelKey, Arc<Kernel>>>,
-}
-
-/// The backends that aogauge computes on.
-fn backends() -> wgpu::Backends {
-    wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12
-}
-
-/// Hardware before software.
-fn preference(kind: wgpu::DeviceType) -> u32 {
-    match kind {
-        wgpu::DeviceType::DiscreteGpu => 0,
-        wgpu::DeviceType::IntegratedGpu => 1,
-        wgpu::DeviceType::VirtualGpu => 2,
-        wgpu::DeviceType::Other => 3,
-        wgpu::DeviceType::Cpu => 4,
-    }
+    /// How it was opened.
+    setup: Setup,
 }
 
 impl Gpu {
@@ -110,36 +106,44 @@ impl Gpu {
         Self::with(Options::default())
     }
 
-    /// Opens the best adapter there is: hardware before software. Backends can be
-    /// narrowed by `WGPU_BACKEND`.
+    /// Opens the best adapter there is: hardware before software. `WGPU_BACKEND`
+    /// and `WGPU_ADAPTER_NAME` narrow the choice.
     ///
     /// # Errors
     /// [`RenderError::NoAdapter`] where there is none, [`RenderError::Device`]
     /// where it cannot be opened, [`RenderError::Raster`] and
     /// [`RenderError::RayQuery`] where it cannot do what the options ask for.
     pub fn with(options: Options) -> Result<Self, RenderError> {
-        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
-        descriptor.backends &= backends();
-        let backends = descriptor.backends;
-        let instance = wgpu::Instance::new(descriptor);
-        let mut adapters = pollster::block_on(instance.enumerate_adapters(backends));
-        adapters.sort_by_key(|a| preference(a.get_info().device_type));
-        let adapter = adapters.into_iter().next().ok_or_else(|| {
-            RenderError::NoAdapter(
-                "no Vulkan, Metal or DirectX 12 driver answers; on Debian, `apt-get install mesa-vulkan-drivers libvulkan1` gives a software one"
-                    .into(),
-            )
-        })?;
-        let by_query = query::is_chosen(options.traversal, &adapter)?;
-        let mut device = Device::open(&adapter, options.checks, by_query)?;
-        if options.g_buffer == GBufferBy::Raster {
+        Self::set_up(Setup { options, ..Setup::default() })
+    }
+
+    fn set_up(setup: Setup) -> Result<Self, RenderError> {
+        let adapter = adapter::best(setup.flags)?;
+        let by_query = query::is_chosen(setup.options.traversal, &adapter)?;
+        let mut device = Device::open(&adapter, &setup, by_query)?;
+        if setup.options.g_buffer == GBufferBy::Raster {
             raster::check(&adapter)?;
             // Mesa 22.3's stamps compute passes wrongly once something was drawn.
             if device.is_software() {
                 device.ignore_timestamps();
             }
         }
-        Ok(Gpu { device, options, kernels: Mutex::default() })
+        Ok(Gpu { device, kernels: Mutex::default(), setup })
+    }
+
+    /// The same adapter, opened anew.
+    fn again(&self) -> Result<Self, RenderError> {
+        let gpu = Self::set_up(self.setup.clone())?;
+        let (was, is) = (self.describe(), gpu.describe());
+        if was != is {
+            return Err(RenderError::Device(format!("{was} is gone; there is only {is}")));
+        }
+        Ok(gpu)
+    }
+
+    /// Whether the device is of no use any more.
+    fn is_lost(&self) -> bool {
+        self.device.is_lost()
     }
 
     /// How rays find triangles and meet them.
@@ -178,7 +182,7 @@ impl Gpu {
         let i = &self.device.info;
         let driver = [i.driver.as_str(), i.driver_info.as_str()].join(" ");
         let query = if self.device.ray_query { ", rays by ray query" } else { "" };
-        let raster = if self.options.g_buffer == GBufferBy::Raster { ", G-buffer by rasterisation" } else { "" };
+        let raster = if self.setup.options.g_buffer == GBufferBy::Raster { ", G-buffer by rasterisation" } else { "" };
         format!("{}, {} ({}){query}{raster}", i.name, driver.trim(), i.backend)
     }
 

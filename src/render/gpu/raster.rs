@@ -81,7 +81,7 @@ impl Raster {
             )));
         }
         let pipeline = pipeline(gpu);
-        let projection = device.uniform("projection", &Projection::zeroed());
+        let projection = device.uniform("projection", &Projection::zeroed())?;
         let bound = [(0, params.as_entire_binding()), triangles, (12, projection.as_entire_binding())];
         let group = device.group(&pipeline.get_bind_group_layout(0), &bound);
         let visible = image(device, resolution, VISIBLE, wgpu::TextureUsages::TEXTURE_BINDING);

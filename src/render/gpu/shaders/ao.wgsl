@@ -95,6 +95,7 @@ fn met(hit: Hit, direction: vec3<f32>) -> Surface {
 }
 
 // The ray of an image point: column and row, in pixels from the top left corner.
+// Twin: View::ray.
 fn view_ray(x: f32, y: f32) -> Ray {
     let origin = params.origin + params.origin_dx * x + params.origin_dy * y;
     let direction = normalize(params.direction + params.direction_dx * x + params.direction_dy * y);
