@@ -1,17 +1,20 @@
 //! A scene on the GPU, and the dispatches that render it.
 
+mod smoothed;
+
 use super::{
     Gpu, SHADER,
     device::{Kernel, Timer, WORKGROUP},
     params::{Params, Program, Stage, places},
 };
 use crate::{
-    render::{Frame, Geometry, Job, Loaded, RenderError, ao::Decisions},
+    render::{Frame, Geometry, Job, Loaded, RenderError, ao::Decisions, smoothing::Smoothing},
     trace::{WIDE_STACK, Wide},
 };
 use aogauge_scenes::luminance;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
+use smoothed::Filters;
 use std::{sync::Arc, time::Instant};
 
 /// Primary rays of one dispatch. A dispatch that runs for seconds is killed by
@@ -23,7 +26,7 @@ const RAYS_HARDWARE: u64 = 1 << 23;
 /// What the shader writes where its loops were stopped early.
 const STOPPED: f32 = -1.0;
 
-/// `Surface` of ao.wgsl.
+/// `Surface` of surface.wgsl.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Surface {
@@ -43,6 +46,8 @@ pub(super) struct Images {
     decisions: wgpu::Buffer,
     see: Bound,
     shade: Bound,
+    /// Once a method asks for them.
+    filters: Option<Filters>,
 }
 
 /// A kernel with its buffers.
@@ -139,7 +144,7 @@ impl<'a> LoadedGpu<'a> {
         let decisions = buffer("decisions", size_of::<Decisions>())?;
         let see = self.bound(self.gpu.kernel(SHADER, "see")?, &surfaces, &sums, Some((5, &decisions)));
         let shade = self.bound_shade(program, &surfaces, &sums, &decisions)?;
-        Ok(Images { pixels, program: *program, surfaces, sums, decisions, see, shade })
+        Ok(Images { pixels, program: *program, surfaces, sums, decisions, see, shade, filters: None })
     }
 
     fn bound_shade(
@@ -173,24 +178,37 @@ impl<'a> LoadedGpu<'a> {
     /// Finds what the view sees, in pieces that are each a submission of their own.
     pub(super) fn see(&self, job: &Job<'_>, program: &Program, images: &Images, timer: Option<&Timer>) {
         let pieces = self.see_pieces(job);
-        self.dispatch(job, program, &images.see, pieces, timer);
+        self.dispatch(job, program, &images.see, pieces, timer.map(|t| (t, 0)));
     }
 
     /// Shades what is seen, likewise.
     pub(super) fn shade(&self, job: &Job<'_>, program: &Program, images: &Images, timer: Option<&Timer>) {
         let pieces = self.pieces(job, program);
-        self.dispatch(job, program, &images.shade, pieces, timer);
+        self.dispatch(job, program, &images.shade, pieces, timer.map(|t| (t, 0)));
     }
 
-    fn dispatch(&self, job: &Job<'_>, program: &Program, bound: &Bound, pieces: Vec<Piece>, timer: Option<&Timer>) {
+    /// A timer notes dispatches in its slots from the one given.
+    fn dispatch(
+        &self,
+        job: &Job<'_>,
+        program: &Program,
+        bound: &Bound,
+        pieces: Vec<Piece>,
+        timer: Option<(&Timer, u64)>,
+    ) {
         let device = &self.gpu.device;
         let offset = self.geometry.tracer.offset();
         for (slot, (places, rays)) in (0..).zip(pieces) {
             let count = places.len() as u32;
             let params = program.params(job, offset, places, rays);
             device.queue.write_buffer(&self.params, 0, bytemuck::bytes_of(&params));
-            device.run_timed(&bound.kernel, &bound.group, count, timer.map(|t| (t, slot)));
+            device.run_timed(&bound.kernel, &bound.group, count, timer.map(|(t, first)| (t, first + slot)));
         }
+    }
+
+    /// The triangle that each pixel sees, as the scene numbers it.
+    fn seen(&self, surfaces: &[Surface]) -> Vec<u32> {
+        surfaces.iter().map(|s| self.source.get(s.triangle as usize).copied().unwrap_or(u32::MAX)).collect()
     }
 
     pub(super) fn see_pieces(&self, job: &Job<'_>) -> Vec<Piece> {
@@ -210,9 +228,18 @@ impl Loaded for LoadedGpu<'_> {
     fn render(&mut self, job: &Job<'_>) -> Result<Frame, RenderError> {
         let program = Program::new(&job.estimator)?;
         self.geometry.suits(&job.estimator, job.ao)?;
-        let images = self.take_images(job, &program)?;
+        let mut images = self.take_images(job, &program)?;
         let start = Instant::now();
         let frame = self.gpu.device.guarded(|| {
+            if program.method.smoothing != Smoothing::NONE {
+                let filters = match images.filters.take() {
+                    Some(filters) => filters,
+                    None => self.filters(&images)?,
+                };
+                let frame = self.smoothed(job, &program, &images, &filters);
+                images.filters = Some(filters);
+                return frame;
+            }
             let dispatches = self.pieces(job, &program).len() as u64;
             let timer = Timer::new(&self.gpu.device, dispatches);
             self.see(job, &program, &images, None);
@@ -220,9 +247,7 @@ impl Loaded for LoadedGpu<'_> {
             let sums: Vec<f32> = self.gpu.device.read(&images.sums)?;
             let wall = start.elapsed().as_secs_f64();
             if sums.contains(&STOPPED) {
-                return Err(RenderError::Device(
-                    "the driver stopped a loop of the shader early: the scene is too deep for it".into(),
-                ));
+                return Err(stopped_early());
             }
             let surfaces: Vec<Surface> = self.gpu.device.read(&images.surfaces)?;
             let decisions = self.gpu.device.read(&images.decisions)?;
@@ -236,16 +261,17 @@ impl Loaded for LoadedGpu<'_> {
                 values,
                 colors,
                 decisions: (program.stage == Stage::Openness).then_some(decisions),
-                seen: surfaces
-                    .iter()
-                    .map(|s| self.source.get(s.triangle as usize).copied().unwrap_or(u32::MAX))
-                    .collect(),
+                seen: self.seen(&surfaces),
                 seconds,
             })
         });
         self.keep_images(images);
         frame
     }
+}
+
+fn stopped_early() -> RenderError {
+    RenderError::Device("the driver stopped a loop of the shader early: the scene is too deep for it".into())
 }
 
 /// What a stage's sums mean: a value a pixel, and its colour where it has one.

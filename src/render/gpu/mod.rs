@@ -21,6 +21,7 @@ const SHADER: &str = concat!(
     include_str!("shaders/sampler.wgsl"),
     include_str!("shaders/trace.wgsl"),
     include_str!("shaders/survey.wgsl"),
+    include_str!("shaders/surface.wgsl"),
     include_str!("shaders/ao.wgsl"),
     include_str!("shaders/indirect.wgsl")
 );
