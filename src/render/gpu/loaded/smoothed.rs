@@ -4,10 +4,7 @@
 use super::{Bound, Images, LoadedGpu, Surface, pieces};
 use crate::render::{
     Frame, Job, RenderError,
-    gpu::{
-        device::Timer,
-        params::{Program, Stage},
-    },
+    gpu::{device::Timer, params::Program},
     smoothing::{Camera, Denoise, Temporal},
 };
 use bytemuck::{Pod, Zeroable};
@@ -175,7 +172,6 @@ impl LoadedGpu<'_> {
         filters: &Filters,
         clock: &mut Clock<'_>,
     ) -> Result<(), RenderError> {
-        debug_assert!(program.stage == Stage::Openness);
         let smoothing = program.method.smoothing;
         let motion = smoothing.temporal.unwrap_or_default();
         let units = f64::from(job.rays) * f64::from(program.method.units());
