@@ -17,6 +17,7 @@ use aogauge::{
     },
     scenes::{Scene, View, library},
     stats::Estimate,
+    suite::Suite,
 };
 use glam::Vec3;
 use std::process::Command;
@@ -390,6 +391,12 @@ fn the_gpu_smooths_as_the_cpu_does() {
             }
         }
     }
+}
+
+#[test]
+fn the_suite_of_the_report_is_legal() {
+    let suite = Suite::load("reports/smoothing/suite.toml").unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(suite.methods.iter().filter(|m| m.estimator != m.estimator.unsmoothed()).count(), 8);
 }
 
 /// `--set` takes both, the output names them, and what is wrong is refused.
