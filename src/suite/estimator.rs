@@ -274,6 +274,9 @@ mod tests {
         let Estimator::Openness(o) = near else { panic!("{near:?}") };
         assert_eq!((o.scale.radius, rays.map(Rays::get)), (Some(1.0), Some(4)));
         assert_eq!(build("preset = 'paper-4'").unwrap().0, Estimator::extended(ReceiverPlane::Counts));
+        let (shipped, _) = build("preset = 'microsoft-sample'\ndenoise = {}").unwrap();
+        let Estimator::Openness(o) = shipped else { panic!("{shipped:?}") };
+        assert_eq!(o.smoothing, Smoothing { temporal: None, denoise: Some(Denoise::default()) });
     }
 
     /// A method is the same after its options have been to disk and back, and the
