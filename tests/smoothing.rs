@@ -9,7 +9,7 @@ use aogauge::{
         Estimator, Frame, Geometry, Job, Loaded, Openness, ReceiverPlane, Renderer,
         cpu::Cpu,
         gbuffer::{GBuffer, Surface},
-        gpu::Gpu,
+        gpu::{Checks, Gpu},
         smoothing::{
             Camera, Denoise, Shot, Smoothing, Temporal, atrous,
             temporal::{History, accumulate},
@@ -325,7 +325,8 @@ fn threads_do_not_matter() {
 
 #[test]
 fn small_and_wide_views_are_smoothed() {
-    let gpu = Gpu::open().unwrap_or_else(|e| panic!("{e}"));
+    // With checks, so that an index outside an image shows.
+    let gpu = Gpu::open_with(Checks::On).unwrap_or_else(|e| panic!("{e}"));
     let scene = library::scene("curtain-arcade").unwrap();
     let geometry = Geometry::new(&scene).unwrap();
     let denoise = Some(Denoise { passes: 8, ..Denoise::default() });
