@@ -18,6 +18,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "Examples:\n  aogauge render curtain-arcade --out classic.png\n  \
 aogauge render curtain-arcade --estimator extended --set receiver_plane=clipped --rays 256 --out extended.exr\n  \
 aogauge render curtain-room --estimator obscurance --set 'falloff={ exponential = { extinction = 4.0 } }' --out o.exr\n  \
+aogauge render curtain-room --rays 4 --set 'temporal={ motion = [0.7, 0.3] }' --set 'denoise={}' --out smooth.exr\n  \
 aogauge render atrium --preset unity-high --view look --out unity.png\n  \
 aogauge render atrium --view look --renderer gpu --g-buffer raster --out hybrid.png\n  \
 aogauge render curtain-arcade --estimator path-traced --rays 1024 --replicates 8 --out judge.exr")]
@@ -57,7 +58,7 @@ pub(super) struct Method {
     pub preset: Option<String>,
     /// An option of the method as in a suite file, KEY=VALUE; may be repeated.
     /// Keys: falloff, faces, intensity, radius, secondary_radius, receiver_plane,
-    /// secondary_rays, secondary_sides, secondary_origin.
+    /// secondary_rays, secondary_sides, secondary_origin, temporal, denoise.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub options: Vec<String>,
     /// Rays, or paths, a pixel; the preset's, or 64.
@@ -238,7 +239,7 @@ fn method(args: &Method, unless_given: Kind) -> Result<(Estimator, Option<u32>),
 }
 
 /// What `--set` takes.
-const OPTIONS: [&str; 9] = [
+const OPTIONS: [&str; 11] = [
     "falloff",
     "faces",
     "intensity",
@@ -248,6 +249,8 @@ const OPTIONS: [&str; 9] = [
     "secondary_rays",
     "secondary_sides",
     "secondary_origin",
+    "temporal",
+    "denoise",
 ];
 
 fn frames(args: &Args, scene: &Scene, estimator: Estimator, rays: u32) -> Result<Vec<Frame>, Failure> {

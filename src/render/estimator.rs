@@ -1,6 +1,7 @@
 //! What is estimated: openness in its variants, local indirect light, or the
 //! whole of light transport.
 
+use super::smoothing::Smoothing;
 use aogauge_scenes::AoScale;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -58,6 +59,8 @@ pub struct Openness {
     pub intensity: f32,
     /// R and R' in place of the scene's.
     pub scale: Scale,
+    /// What is done to the mean over rays before the power is taken.
+    pub smoothing: Smoothing,
 }
 
 /// Lengths in place of the scene's.
@@ -218,7 +221,7 @@ pub enum SecondaryOrigin {
 }
 
 impl Openness {
-    /// Without extension, intensity or scale of its own.
+    /// Without extension, intensity, scale of its own or smoothing.
     pub const fn plain(falloff: Falloff) -> Self {
         Openness {
             falloff,
@@ -226,6 +229,7 @@ impl Openness {
             extension: None,
             intensity: 1.0,
             scale: Scale { radius: None, secondary_radius: None },
+            smoothing: Smoothing::NONE,
         }
     }
 
@@ -238,8 +242,16 @@ impl Openness {
 
     /// Openness from a sum over `rays` of [`Decided::units`](super::ao::Decided::units).
     pub fn mean(&self, sum: f64, rays: u32) -> f32 {
-        let units = self.extension.map_or(1, |e| e.secondary_rays);
-        let mean = sum / (f64::from(rays) * f64::from(units));
+        self.finished(sum / (f64::from(rays) * f64::from(self.units())))
+    }
+
+    /// What an open ray counts in a sum.
+    pub(super) fn units(&self) -> u32 {
+        self.extension.map_or(1, |e| e.secondary_rays)
+    }
+
+    /// A mean over rays to the power `intensity`.
+    pub(super) fn finished(&self, mean: f64) -> f32 {
         if self.intensity == 1.0 { mean as f32 } else { mean.powf(f64::from(self.intensity)) as f32 }
     }
 }
@@ -267,6 +279,16 @@ impl Estimator {
             },
             Estimator::LocalIndirect(_) => Kind::LocalIndirect,
             Estimator::PathTraced => Kind::PathTraced,
+        }
+    }
+
+    /// The same method without smoothing: what a converged image is made by, as
+    /// smoothing many rays would hide what smoothing does.
+    #[must_use]
+    pub fn unsmoothed(self) -> Self {
+        match self {
+            Estimator::Openness(o) => Estimator::Openness(Openness { smoothing: Smoothing::NONE, ..o }),
+            other => other,
         }
     }
 

@@ -45,4 +45,9 @@ impl GBuffer {
             .collect();
         GBuffer { resolution: view.resolution, surfaces }
     }
+
+    /// The triangle that each pixel sees; `u32::MAX` for none.
+    pub(super) fn triangles(&self) -> Vec<u32> {
+        self.surfaces.iter().map(|s| s.map_or(u32::MAX, |s| s.triangle)).collect()
+    }
 }

@@ -13,6 +13,7 @@ pub mod lights;
 pub mod materials;
 pub mod path;
 pub mod sampler;
+pub mod smoothing;
 
 pub use estimator::{
     Estimator, Extension, Faces, Falloff, Kind, LocalIndirect, Openness, ReceiverPlane, Scale, SecondaryOrigin, Sides,
@@ -34,13 +35,14 @@ pub struct Frame {
     /// The same by linear red, green and blue, for estimators that know colour.
     pub colors: Option<Vec<[f32; 3]>>,
     /// How each ray was decided, for up to 32 rays a pixel: see
-    /// [`ao::Decisions`].
+    /// [`ao::Decisions`]. None for images that were smoothed.
     pub decisions: Option<Vec<ao::Decisions>>,
     /// The triangle that each pixel sees, in the order of the scene; `u32::MAX`
     /// for none.
     pub seen: Vec<u32>,
-    /// Time the rays took, seconds: wall clock on the CPU, timestamp queries on
-    /// the GPU (wall clock of the submission where the adapter has none).
+    /// Time the rays took, and smoothing after them, over all its frames, seconds:
+    /// wall clock on the CPU, timestamp queries on the GPU (wall clock of the
+    /// submission where the adapter has none).
     pub seconds: f64,
 }
 
@@ -175,6 +177,11 @@ pub enum RenderError {
         /// What may be asked for.
         knows: &'static str,
     },
+    /// Smoothing needs to know where points appear.
+    #[error(
+        "temporal and denoise need a view that is orthographic or perspective and has an extent; this one is neither"
+    )]
+    NoCamera,
     /// A GPU was asked for by name and there is none.
     #[error("no GPU adapter was found: {0}")]
     NoAdapter(String),

@@ -21,6 +21,8 @@ struct Context<'a> {
     verdicts: Vec<VerdictRow>,
     scenes: Vec<SceneSection>,
     judge_seconds: f64,
+    /// Whether any method is smoothed.
+    smoothed: bool,
     pictures: &'a str,
     summary: String,
 }
@@ -218,6 +220,7 @@ pub fn text(record: &Record) -> Result<String, minijinja::Error> {
         verdicts,
         scenes,
         judge_seconds,
+        smoothed: record.suite.methods.values().any(|m| m.temporal.is_some() || m.denoise.is_some()),
         pictures: PICTURES,
         summary: record.summary_line(),
     }))

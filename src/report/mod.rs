@@ -79,7 +79,10 @@ fn pictures(folder: &Path, record: &Record, scene: &SceneRecord, out: &Path) -> 
 
     let converged = read(&scene.image)?;
     for name in &record.suite.estimators {
-        let values = layer(&converged, &scene.image, &format!("converged-{name}"))?;
+        let values = match smoothed(record, scene, name) {
+            Some(image) => layer(&read(image)?, image, "mean")?,
+            None => layer(&converged, &scene.image, &format!("converged-{name}"))?,
+        };
         let (values, size) = middle(scene, &values);
         picture::openness(&values, size, 4, &out.join("measure").join(format!("{name}.png")))?;
     }
@@ -98,6 +101,17 @@ fn pictures(folder: &Path, record: &Record, scene: &SceneRecord, out: &Path) -> 
     let svg = plot::profile(scene).map_err(|message| ReportError::Plot { scene: scene.name.clone(), message })?;
     write_whole(&out.join("profile.svg"), |buffer| buffer.write_all(svg.as_bytes()))?;
     Ok(())
+}
+
+/// The image of a smoothed method, of the most rays, whose mean over replicates shows
+/// what its converged image, which is not smoothed, does not. None for others.
+fn smoothed<'a>(record: &'a Record, scene: &SceneRecord, method: &str) -> Option<&'a str> {
+    let file = record.suite.methods.get(method)?;
+    if file.temporal.is_none() && file.denoise.is_none() {
+        return None;
+    }
+    let own = record.cases.iter().filter(|c| c.case.scene == scene.name && c.case.estimator == method);
+    own.filter(|c| c.image.is_some()).max_by_key(|c| c.case.rays)?.image.as_deref()
 }
 
 /// The columns of a measure image within R of its centre, so that pictures are

@@ -119,7 +119,7 @@ impl<'a> Set<'a> {
             let replicates = (0..CONVERGED_REPLICATES).map(|replicate| {
                 let job = Job {
                     view: &self.view,
-                    estimator: method.estimator,
+                    estimator: method.estimator.unsmoothed(),
                     ao: self.scene.ao,
                     rays: self.plan.suite.file.converged_rays.get() / CONVERGED_REPLICATES,
                     seed: self.plan.seed.wrapping_add(CONVERGED),

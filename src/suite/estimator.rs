@@ -3,6 +3,7 @@
 use super::Rays;
 use crate::render::{
     Estimator, Extension, Faces, Falloff, Kind, LocalIndirect, Openness, ReceiverPlane, Scale, SecondaryOrigin, Sides,
+    smoothing::{Denoise, Smoothing, Temporal},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -57,6 +58,12 @@ pub struct EstimatorFile {
     /// the middle unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub secondary_origin: Option<SecondaryOrigin>,
+    /// For openness: accumulation over frames, before `denoise`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temporal: Option<Temporal>,
+    /// For openness: the spatial filter, before `intensity`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub denoise: Option<Denoise>,
 }
 
 /// The paper's number.
@@ -92,6 +99,7 @@ impl EstimatorFile {
                     file.secondary_sides = Some(e.sides).filter(|s| *s != Sides::default());
                     file.secondary_origin = Some(e.origin).filter(|o| *o != SecondaryOrigin::default());
                 }
+                (file.temporal, file.denoise) = (o.smoothing.temporal, o.smoothing.denoise);
                 (o.falloff, o.scale)
             }
             Estimator::LocalIndirect(l) => (l.falloff, l.scale),
@@ -130,6 +138,8 @@ impl EstimatorFile {
             secondary_rays: self.secondary_rays.or(base.secondary_rays),
             secondary_sides: self.secondary_sides.or(base.secondary_sides),
             secondary_origin: self.secondary_origin.or(base.secondary_origin),
+            temporal: self.temporal.or(base.temporal),
+            denoise: self.denoise.or(base.denoise),
         })
     }
 
@@ -148,6 +158,8 @@ impl EstimatorFile {
             ("secondary_rays", self.secondary_rays.is_some(), extended),
             ("secondary_sides", self.secondary_sides.is_some(), extended),
             ("secondary_origin", self.secondary_origin.is_some(), extended),
+            ("temporal", self.temporal.is_some(), openness),
+            ("denoise", self.denoise.is_some(), openness),
         ] {
             if given && !allowed {
                 return Err(format!("{field} means nothing for kind '{kind}'"));
@@ -156,6 +168,8 @@ impl EstimatorFile {
         let scale = Scale { radius: self.radius, secondary_radius: self.secondary_radius };
         between("radius", self.radius, 0.0, 1e6, " m")?;
         between("secondary_radius", self.secondary_radius, 0.0, 1e6, " m")?;
+        let smoothing = Smoothing { temporal: self.temporal, denoise: self.denoise };
+        smoothing.check()?;
         let falloff = match (self.falloff, kind) {
             (Some(Falloff::Step), Kind::Obscurance | Kind::ExtendedObscurance) => {
                 return Err(format!("kind '{kind}' with falloff 'step' is kind '{}'", of_step(kind)));
@@ -178,6 +192,7 @@ impl EstimatorFile {
                 extension: if extended { Some(self.extension(kind)?) } else { None },
                 intensity: between("intensity", self.intensity, 0.0, 16.0, "")?.unwrap_or(1.0),
                 scale,
+                smoothing,
             }),
         })
     }
@@ -259,6 +274,9 @@ mod tests {
         let Estimator::Openness(o) = near else { panic!("{near:?}") };
         assert_eq!((o.scale.radius, rays.map(Rays::get)), (Some(1.0), Some(4)));
         assert_eq!(build("preset = 'paper-4'").unwrap().0, Estimator::extended(ReceiverPlane::Counts));
+        let (shipped, _) = build("preset = 'microsoft-sample'\ndenoise = {}").unwrap();
+        let Estimator::Openness(o) = shipped else { panic!("{shipped:?}") };
+        assert_eq!(o.smoothing, Smoothing { temporal: None, denoise: Some(Denoise::default()) });
     }
 
     /// A method is the same after its options have been to disk and back, and the
@@ -271,6 +289,9 @@ mod tests {
             "kind = 'extended'\nreceiver_plane = 'clipped'\nsecondary_radius = 0.1\nsecondary_rays = 5",
             "kind = 'extended-obscurance'\nfalloff = { linear-tail = { tail = 0.5 } }\nreceiver_plane = 'counts'\n\
              secondary_sides = 'one'\nsecondary_origin = 'jittered'",
+            "kind = 'classic'\ntemporal = { frames = 8, blend = 0.2, motion = [0.7, -0.3] }",
+            "kind = 'extended'\nreceiver_plane = 'counts'\ntemporal = {}\n\
+             denoise = { passes = 2, normal = 0.2, plane = 3.0, openness = 1.0 }",
             "kind = 'local-indirect'\nfalloff = { exponential = { extinction = 4.0 } }",
             "kind = 'path-traced'",
         ] {
@@ -301,6 +322,16 @@ mod tests {
             ("kind = 'classic'\nradius = nan", "radius is NaN m"),
             ("kind = 'extended'\nreceiver_plane = 'counts'\nsecondary_rays = 9", "1 to 8"),
             ("kind = 'path-traced'\nradius = 1", "radius means nothing"),
+            ("kind = 'classic'\ntemporal = { frames = 1 }", "temporal.frames is 1: it must be from 2 to 256"),
+            ("kind = 'classic'\ntemporal = { blend = 0 }", "temporal.blend is 0: it must be above 0 and at most 1"),
+            ("kind = 'classic'\ntemporal = { motion = [0, nan] }", "temporal.motion is NaN: it must be from -64 to 64"),
+            ("kind = 'classic'\ntemporal = { motions = [0, 1] }", "motions"),
+            ("kind = 'classic'\ndenoise = { passes = 9 }", "denoise.passes is 9: it must be from 1 to 8"),
+            ("kind = 'classic'\ndenoise = { normal = 3 }", "denoise.normal is 3: it must be above 0 and at most 2"),
+            ("kind = 'classic'\ndenoise = { plane = 0 }", "denoise.plane is 0"),
+            ("kind = 'classic'\ndenoise = { openness = -1 }", "denoise.openness is -1"),
+            ("kind = 'path-traced'\ndenoise = {}", "denoise means nothing for kind 'path-traced'"),
+            ("kind = 'local-indirect'\ntemporal = {}", "temporal means nothing for kind 'local-indirect'"),
             ("kind = 'clasic'", "classic"),
             ("kind = 'classic'\ncolour = 1", "colour"),
         ] {

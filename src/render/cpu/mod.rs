@@ -1,11 +1,14 @@
 //! The CPU reference renderer.
 
+mod smoothed;
+
 use super::{
     Estimator, Frame, Geometry, Job, Loaded, Openness, RenderError, Renderer,
     ao::{Decisions, Shading},
     gbuffer::{GBuffer, Surface},
     indirect, path,
     sampler::Sampler,
+    smoothing::Smoothing,
 };
 use crate::trace::Tracer;
 use aogauge_scenes::{View, luminance};
@@ -37,6 +40,11 @@ impl Loaded for LoadedCpu<'_> {
             Some((view, gbuffer)) if view == job.view => gbuffer,
             _ => &self.seen.insert((*job.view, GBuffer::new(tracer, job.view))).1,
         };
+        if let Estimator::Openness(method) = &job.estimator
+            && method.smoothing != Smoothing::NONE
+        {
+            return smoothed::smoothed(tracer, gbuffer, job, method);
+        }
         let start = Instant::now();
         let image = match &job.estimator {
             Estimator::Openness(method) => openness(tracer, gbuffer, job, *method),
@@ -53,7 +61,7 @@ impl Loaded for LoadedCpu<'_> {
             values: image.values,
             colors: image.colors,
             decisions: image.decisions,
-            seen: gbuffer.surfaces.iter().map(|s| s.map_or(u32::MAX, |s| s.triangle)).collect(),
+            seen: gbuffer.triangles(),
             seconds: start.elapsed().as_secs_f64(),
         })
     }

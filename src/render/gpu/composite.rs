@@ -19,6 +19,7 @@ use std::{collections::BTreeMap, sync::Arc};
 /// The shader of lit views.
 const SHADER: &str = concat!(
     include_str!("shaders/sampler.wgsl"),
+    include_str!("shaders/surface.wgsl"),
     include_str!("shaders/ao.wgsl"),
     include_str!("shaders/brdf.wgsl"),
     include_str!("shaders/materials.wgsl"),
@@ -259,7 +260,7 @@ impl Lit<'_> {
         let gpu = self.scene.gpu;
         gpu.device.guarded(|| {
             let shaded = gpu.device.storage("pixels", pixels as u64 * size_of::<Shaded>() as u64)?;
-            let kernel = gpu.kernel(SHADER, "shade")?;
+            let kernel = gpu.tracing_kernel(SHADER, "shade", vec![])?;
             let own = self.buffers.iter().map(|(binding, buffer)| (*binding, buffer.as_entire_binding()));
             let all: Vec<_> = [self.scene.told()]
                 .into_iter()

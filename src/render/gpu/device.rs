@@ -284,6 +284,15 @@ impl Device {
         self.tick.is_some()
     }
 
+    /// Copies buffers into others of their size.
+    pub fn copy(&self, pairs: &[(&wgpu::Buffer, &wgpu::Buffer)]) {
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        for (from, to) in pairs {
+            encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
+        }
+        self.queue.submit([encoder.finish()]);
+    }
+
     /// Copies a buffer back, once all that was submitted has run.
     pub fn read<T: Pod>(&self, source: &wgpu::Buffer) -> Result<Vec<T>, RenderError> {
         let staging = self.device.create_buffer(&wgpu::BufferDescriptor {

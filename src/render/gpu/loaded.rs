@@ -1,5 +1,7 @@
 //! A scene on the GPU, and the dispatches that render it.
 
+mod smoothed;
+
 use super::{
     GBufferBy, Gpu, SHADER,
     device::{Kernel, Timer, WORKGROUP},
@@ -8,12 +10,13 @@ use super::{
     raster::Raster,
 };
 use crate::{
-    render::{Frame, Geometry, Job, Loaded, RenderError, ao::Decisions},
+    render::{Frame, Geometry, Job, Loaded, RenderError, ao::Decisions, smoothing::Smoothing},
     trace::{WIDE_STACK, Wide},
 };
 use aogauge_scenes::luminance;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
+use smoothed::Filters;
 use std::{sync::Arc, time::Instant};
 
 /// Primary rays of one dispatch. A dispatch that runs for seconds is killed by
@@ -25,7 +28,7 @@ const RAYS_HARDWARE: u64 = 1 << 23;
 /// What the shader writes where its loops were stopped early.
 pub(super) const STOPPED: f32 = -1.0;
 
-/// `Surface` of ao.wgsl.
+/// `Surface` of surface.wgsl.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Surface {
@@ -47,6 +50,15 @@ pub(super) struct Images {
     raster: Option<Raster>,
     see: Bound,
     shade: Bound,
+    /// Once a method asks for them.
+    filters: Option<Filters>,
+}
+
+impl Images {
+    fn pixels(&self) -> u64 {
+        let [width, height] = self.resolution.map(u64::from);
+        width * height
+    }
 }
 
 /// A kernel with its buffers.
@@ -166,9 +178,10 @@ impl<'a> LoadedGpu<'a> {
         let sums = buffer("sums", size_of::<f32>() * stage.channels() as usize)?;
         let decisions = buffer("decisions", size_of::<Decisions>())?;
         let (raster, see) = match self.gpu.setup.options.g_buffer {
-            GBufferBy::Rays => {
-                (None, self.bound(self.gpu.kernel(SHADER, "see")?, &surfaces, &sums, Some((5, &decisions))))
-            }
+            GBufferBy::Rays => (
+                None,
+                self.bound(self.gpu.tracing_kernel(SHADER, "see", vec![])?, &surfaces, &sums, Some((5, &decisions))),
+            ),
             GBufferBy::Raster => {
                 let [_, triangles] = self.tracing();
                 let seen = [(0, &self.params), (3, &surfaces), (4, &sums), (5, &decisions)];
@@ -181,7 +194,7 @@ impl<'a> LoadedGpu<'a> {
             }
         };
         let shade = self.bound_shade(program, &surfaces, &sums, &decisions)?;
-        Ok(Images { resolution, program: *program, surfaces, sums, decisions, raster, see, shade })
+        Ok(Images { resolution, program: *program, surfaces, sums, decisions, raster, see, shade, filters: None })
     }
 
     fn bound_shade(
@@ -195,7 +208,7 @@ impl<'a> LoadedGpu<'a> {
             Stage::Openness => ("openness", Some((5, decisions))),
             Stage::Indirect => ("indirect", self.materials.as_ref().map(|m| (6, m))),
         };
-        let kernel = self.gpu.specialized(SHADER, entry, program.constants())?;
+        let kernel = self.gpu.tracing_kernel(SHADER, entry, program.constants())?;
         Ok(self.bound(kernel, surfaces, sums, more))
     }
 
@@ -260,6 +273,11 @@ impl<'a> LoadedGpu<'a> {
         }
     }
 
+    /// The triangle that each pixel sees, as the scene numbers it.
+    fn seen(&self, surfaces: &[Surface]) -> Vec<u32> {
+        surfaces.iter().map(|s| self.source.get(s.triangle as usize).copied().unwrap_or(u32::MAX)).collect()
+    }
+
     /// Submissions of [`Self::see`].
     pub(super) fn see_count(&self, job: &Job<'_>, images: &Images) -> u64 {
         images.raster.as_ref().map_or(0, Raster::pieces) + self.see_pieces(job).len() as u64
@@ -282,9 +300,18 @@ impl Loaded for LoadedGpu<'_> {
     fn render(&mut self, job: &Job<'_>) -> Result<Frame, RenderError> {
         let program = Program::new(&job.estimator)?;
         self.geometry.suits(&job.estimator, job.ao)?;
-        let images = self.take_images(job, &program)?;
+        let mut images = self.take_images(job, &program)?;
         let start = Instant::now();
         let frame = self.gpu.device.guarded(|| {
+            if program.method.smoothing != Smoothing::NONE {
+                let filters = match images.filters.take() {
+                    Some(filters) => filters,
+                    None => self.filters(&images)?,
+                };
+                let frame = self.smoothed(job, &program, &images, &filters);
+                images.filters = Some(filters);
+                return frame;
+            }
             let dispatches = self.pieces(job, &program).len() as u64;
             let timer = Timer::new(&self.gpu.device, dispatches);
             self.see(job, &program, &images, None)?;
@@ -306,10 +333,7 @@ impl Loaded for LoadedGpu<'_> {
                 values,
                 colors,
                 decisions: (program.stage == Stage::Openness).then_some(decisions),
-                seen: surfaces
-                    .iter()
-                    .map(|s| self.source.get(s.triangle as usize).copied().unwrap_or(u32::MAX))
-                    .collect(),
+                seen: self.seen(&surfaces),
                 seconds,
             })
         });
@@ -317,7 +341,6 @@ impl Loaded for LoadedGpu<'_> {
         frame
     }
 }
-
 /// What a stage's sums mean: a value a pixel, and its colour where it has one.
 fn finished(program: &Program, sums: &[f32], surfaces: &[Surface], rays: u32) -> (Vec<f32>, Option<Vec<[f32; 3]>>) {
     let missed = |s: &Surface| s.triangle == u32::MAX;

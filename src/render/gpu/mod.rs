@@ -30,7 +30,7 @@ use std::{
 pub use timing::{Clock, Rounds, Timed};
 
 /// How rays find triangles and meet them, by the renderer's own tree. One of these
-/// two is put before every other shader.
+/// two is put before every shader that traces.
 const TRACE: &str = concat!(
     include_str!("shaders/trace.wgsl"),
     include_str!("shaders/survey.wgsl"),
@@ -43,6 +43,7 @@ const TRACE_QUERY: &str = concat!(include_str!("shaders/trace_query.wgsl"), incl
 /// The shader of what a view sees, openness and indirect light.
 const SHADER: &str = concat!(
     include_str!("shaders/sampler.wgsl"),
+    include_str!("shaders/surface.wgsl"),
     include_str!("shaders/ao.wgsl"),
     include_str!("shaders/indirect.wgsl")
 );
@@ -151,27 +152,31 @@ impl Gpu {
         if self.device.ray_query { TRACE_QUERY } else { TRACE }
     }
 
-    /// An entry point of a shader without constants.
+    /// An entry point of a shader that traces no rays.
     fn kernel(&self, source: &'static str, entry: &'static str) -> Result<Arc<Kernel>, RenderError> {
-        self.specialized(source, entry, Constants::new())
+        self.compiled("", (source, entry, Constants::new()))
     }
 
-    /// An entry point of a shader, compiled when it is first used with these
-    /// values of its `override` constants. What traces rays is put before the
-    /// source.
-    fn specialized(
+    /// An entry point of one that does, for these values of its `override`
+    /// constants. What traces rays is put before the source.
+    fn tracing_kernel(
         &self,
         source: &'static str,
         entry: &'static str,
         constants: Constants,
     ) -> Result<Arc<Kernel>, RenderError> {
+        self.compiled(self.trace(), (source, entry, constants))
+    }
+
+    /// Compiles what is used for the first time.
+    fn compiled(&self, before: &str, key: KernelKey) -> Result<Arc<Kernel>, RenderError> {
         let mut kernels = self.kernels.lock().unwrap_or_else(PoisonError::into_inner);
-        let key = (source, entry, constants);
         if let Some(kernel) = kernels.get(&key) {
             return Ok(kernel.clone());
         }
-        let values: Vec<(&str, f64)> = key.2.iter().map(|&(name, value)| (name, f64::from(value))).collect();
-        let kernel = Arc::new(self.device.kernel(&[self.trace(), source].concat(), entry, &values)?);
+        let (source, entry, constants) = &key;
+        let values: Vec<(&str, f64)> = constants.iter().map(|&(name, value)| (name, f64::from(value))).collect();
+        let kernel = Arc::new(self.device.kernel(&[before, source].concat(), entry, &values)?);
         kernels.insert(key, kernel.clone());
         Ok(kernel)
     }

@@ -13,8 +13,12 @@ use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 
 /// The shader, with what it shares with seeing by rays.
-const SHADER: &str =
-    concat!(include_str!("shaders/sampler.wgsl"), include_str!("shaders/ao.wgsl"), include_str!("shaders/raster.wgsl"));
+const SHADER: &str = concat!(
+    include_str!("shaders/sampler.wgsl"),
+    include_str!("shaders/surface.wgsl"),
+    include_str!("shaders/ao.wgsl"),
+    include_str!("shaders/raster.wgsl")
+);
 
 /// Triangles of one submission, so that none runs for seconds.
 const TRIANGLES: u32 = 1 << 20;
@@ -95,7 +99,7 @@ impl Raster {
         gpu: &Gpu,
         mut bound: Vec<(u32, wgpu::BindingResource<'a>)>,
     ) -> Result<(Arc<Kernel>, wgpu::BindGroup), RenderError> {
-        let kernel = gpu.kernel(SHADER, "resolve")?;
+        let kernel = gpu.tracing_kernel(SHADER, "resolve", vec![])?;
         bound.push((13, wgpu::BindingResource::TextureView(&self.visible)));
         let group = gpu.device.bind(&kernel, &bound);
         Ok((kernel, group))

@@ -64,13 +64,6 @@ fn is_set(option: u32) -> bool {
     return (OPTIONS & option) != 0u;
 }
 
-struct Surface {
-    point: vec3<f32>,
-    triangle: u32,
-    normal: vec3<f32>,
-    unused: u32,
-}
-
 struct Decisions {
     primary: u32,
     first: u32,
