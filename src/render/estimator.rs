@@ -1,6 +1,7 @@
 //! What is estimated: openness in its variants, local indirect light, or the
 //! whole of light transport.
 
+use super::screen_space::{Integral, ScreenSpace};
 use aogauge_scenes::AoScale;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -13,6 +14,8 @@ pub enum Estimator {
     /// Openness plus the light of nearby occluders, by luminance, for an ambient
     /// radiance of 1 (the paper's Eq. 3 and 4): O + I.
     LocalIndirect(LocalIndirect),
+    /// `hbao`, `gtao`: openness from a camera's depth and normals.
+    ScreenSpace(ScreenSpace),
     /// Irradiance over pi from the scene's light with diffuse interreflection:
     /// unbiased, and without R.
     PathTraced,
@@ -32,6 +35,10 @@ pub enum Kind {
     ExtendedObscurance,
     /// Openness plus the light that nearby occluders send back.
     LocalIndirect,
+    /// Horizon-based, from depth and normals: uniform in solid angle.
+    Hbao,
+    /// Horizon-based, from depth and normals: cosine-weighted.
+    Gtao,
     /// The whole of light transport.
     PathTraced,
 }
@@ -102,6 +109,8 @@ pub enum Falloff {
         /// That part, in (0, 1]; XeGTAO's is 0.615.
         tail: f32,
     },
+    /// (d/R)^2 up to R (HBAO).
+    Quadratic,
     /// A = 1 - (1 - floor) exp(-lambda (d/R)^2) up to R, then brightened for
     /// interreflection to A / (1 - rho (1 - A)) (Microsoft's sample).
     Gaussian {
@@ -129,6 +138,7 @@ impl Falloff {
         match self {
             Falloff::Step => 0.0,
             Falloff::Exponential { extinction } => -(-extinction * d).exp_m1(),
+            Falloff::Quadratic => (d / radius) * (d / radius),
             Falloff::LinearTail { tail } => (1.0 - (1.0 - d / radius) / tail).clamp(0.0, 1.0),
             Falloff::Gaussian { lambda, floor, reflectance } => {
                 let x = d / radius;
@@ -266,6 +276,10 @@ impl Estimator {
                 (_, Some(_)) => Kind::ExtendedObscurance,
             },
             Estimator::LocalIndirect(_) => Kind::LocalIndirect,
+            Estimator::ScreenSpace(s) => match s.integral {
+                Integral::Hbao { .. } => Kind::Hbao,
+                Integral::Gtao => Kind::Gtao,
+            },
             Estimator::PathTraced => Kind::PathTraced,
         }
     }
@@ -286,6 +300,7 @@ mod tests {
         for (falloff, d, expected) in [
             (Falloff::Step, 0.499, 0.0),
             (Falloff::Exponential { extinction: 2.0 }, 0.5, 1.0 - (-1.0f32).exp()),
+            (Falloff::Quadratic, 0.25, 0.25),
             (Falloff::LinearTail { tail: 0.615 }, 0.0, 0.0),
             (Falloff::LinearTail { tail: 0.615 }, 0.5 * (1.0 - 0.615), 0.0),
             (Falloff::LinearTail { tail: 0.615 }, 0.5 * (1.0 - 0.3075), 0.5),

@@ -13,10 +13,13 @@ pub mod lights;
 pub mod materials;
 pub mod path;
 pub mod sampler;
+pub mod screen_space;
 
 pub use estimator::{
     Estimator, Extension, Faces, Falloff, Kind, LocalIndirect, Openness, ReceiverPlane, Scale, SecondaryOrigin, Sides,
 };
+
+pub use screen_space::ScreenSpace;
 
 use crate::trace::Tracer;
 use aogauge_scenes::{AoScale, Environment, Object, Scene, View};
@@ -29,7 +32,8 @@ pub struct Frame {
     /// Width and height in pixels.
     pub resolution: [u32; 2],
     /// What the estimator computes, openness in [0, 1] or light by luminance; NaN
-    /// where the view meets no surface.
+    /// where the view meets no surface. Few slices of `gtao` may read above 1, and
+    /// few directions of `hbao` below 0: only their mean has bounds.
     pub values: Vec<f32>,
     /// The same by linear red, green and blue, for estimators that know colour.
     pub colors: Option<Vec<[f32; 3]>>,
@@ -49,11 +53,15 @@ pub struct Frame {
 pub struct Job<'a> {
     /// From where.
     pub view: &'a View,
+    /// The camera whose depth and normals a method of screen space takes, where
+    /// that is not the view itself; others ignore it. What it does not show is
+    /// NaN.
+    pub camera: Option<&'a View>,
     /// What.
     pub estimator: Estimator,
     /// R and R'.
     pub ao: AoScale,
-    /// N, primary rays a pixel.
+    /// N, primary rays a pixel; slices or directions in screen space.
     pub rays: u32,
     /// The run's seed.
     pub seed: u32,
@@ -107,6 +115,7 @@ impl Geometry {
         match estimator {
             Estimator::Openness(o) => check_rounding(&self.tracer, o.scale.on(ao).radius),
             Estimator::LocalIndirect(l) => check_rounding(&self.tracer, l.scale.on(ao).radius),
+            Estimator::ScreenSpace(s) => check_rounding(&self.tracer, s.radius(ao)),
             Estimator::PathTraced => Ok(()),
         }
     }
@@ -175,6 +184,9 @@ pub enum RenderError {
         /// What may be asked for.
         knows: &'static str,
     },
+    /// A camera from which screen space cannot be seen.
+    #[error("screen-space methods need a camera that is perspective or orthographic, and has an extent")]
+    Camera,
     /// A GPU was asked for by name and there is none.
     #[error("no GPU adapter was found: {0}")]
     NoAdapter(String),

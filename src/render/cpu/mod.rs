@@ -6,6 +6,7 @@ use super::{
     gbuffer::{GBuffer, Surface},
     indirect, path,
     sampler::Sampler,
+    screen_space::Screen,
 };
 use crate::trace::Tracer;
 use aogauge_scenes::{View, luminance};
@@ -21,11 +22,13 @@ struct LoadedCpu<'a> {
     geometry: &'a Geometry,
     /// The view rendered last, with what it sees: replicates share it.
     seen: Option<(View, GBuffer)>,
+    /// The same for screen space.
+    screen: Option<Screen>,
 }
 
 impl Renderer for Cpu {
     fn load<'a>(&'a self, geometry: &'a Geometry) -> Result<Box<dyn Loaded + 'a>, RenderError> {
-        Ok(Box::new(LoadedCpu { geometry, seen: None }))
+        Ok(Box::new(LoadedCpu { geometry, seen: None, screen: None }))
     }
 }
 
@@ -37,6 +40,10 @@ impl Loaded for LoadedCpu<'_> {
             Some((view, gbuffer)) if view == job.view => gbuffer,
             _ => &self.seen.insert((*job.view, GBuffer::new(tracer, job.view))).1,
         };
+        let screen = match &job.estimator {
+            Estimator::ScreenSpace(_) => Some(Screen::again(&mut self.screen, tracer, gbuffer, job)?),
+            _ => None,
+        };
         let start = Instant::now();
         let image = match &job.estimator {
             Estimator::Openness(method) => openness(tracer, gbuffer, job, *method),
@@ -44,6 +51,7 @@ impl Loaded for LoadedCpu<'_> {
                 let sampler = Sampler::new(job.seed, pixel, job.replicate);
                 indirect::incident(self.geometry, surface, job.ao, method, job.rays, &sampler)
             })),
+            Estimator::ScreenSpace(method) => Image::plain(screen.map_or_else(Vec::new, |s| s.openness(job, method))),
             Estimator::PathTraced => {
                 Image::colored(path::colors(self.geometry, gbuffer, job.rays, job.seed, job.replicate))
             }
@@ -67,6 +75,10 @@ struct Image {
 }
 
 impl Image {
+    fn plain(values: Vec<f32>) -> Self {
+        Image { values, colors: None, decisions: None }
+    }
+
     fn colored(colors: Vec<[f32; 3]>) -> Self {
         Image { values: colors.iter().map(|&c| luminance(c)).collect(), colors: Some(colors), decisions: None }
     }

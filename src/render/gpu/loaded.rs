@@ -6,9 +6,10 @@ use super::{
     params::{Params, Program, Stage, places},
     query,
     raster::Raster,
+    screen_space::OnScreen,
 };
 use crate::{
-    render::{Frame, Geometry, Job, Loaded, RenderError, ao::Decisions},
+    render::{Estimator, Frame, Geometry, Job, Loaded, RenderError, ao::Decisions},
     trace::{WIDE_STACK, Wide},
 };
 use aogauge_scenes::luminance;
@@ -25,14 +26,14 @@ const RAYS_HARDWARE: u64 = 1 << 23;
 /// What the shader writes where its loops were stopped early.
 const STOPPED: f32 = -1.0;
 
-/// `Surface` of ao.wgsl.
+/// `Surface` of ao.wgsl and screen_space.wgsl.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct Surface {
-    point: [f32; 3],
-    triangle: u32,
-    normal: [f32; 3],
-    unused: u32,
+pub(super) struct Surface {
+    pub point: [f32; 3],
+    pub triangle: u32,
+    pub normal: [f32; 3],
+    pub unused: u32,
 }
 
 /// Buffers that depend on the number of pixels.
@@ -75,6 +76,7 @@ pub(super) struct LoadedGpu<'a> {
     materials: Option<wgpu::Buffer>,
     params: wgpu::Buffer,
     images: Option<Images>,
+    screen: Option<OnScreen>,
 }
 
 impl<'a> LoadedGpu<'a> {
@@ -107,6 +109,7 @@ impl<'a> LoadedGpu<'a> {
                 materials: None,
                 params: device.uniform("params", &Params::zeroed()),
                 images: None,
+                screen: None,
             })
         })
     }
@@ -274,8 +277,13 @@ impl<'a> LoadedGpu<'a> {
 
 impl Loaded for LoadedGpu<'_> {
     fn render(&mut self, job: &Job<'_>) -> Result<Frame, RenderError> {
-        let program = Program::new(&job.estimator)?;
         self.geometry.suits(&job.estimator, job.ao)?;
+        if let Estimator::ScreenSpace(method) = &job.estimator {
+            let budget = self.budget();
+            return OnScreen::again(&mut self.screen, self.gpu, &self.geometry.tracer, job)?
+                .render(job, method, budget);
+        }
+        let program = Program::new(&job.estimator)?;
         let images = self.take_images(job, &program)?;
         let start = Instant::now();
         let frame = self.gpu.device.guarded(|| {
@@ -333,7 +341,7 @@ pub(super) type Piece = (std::ops::Range<u32>, std::ops::Range<u32>);
 
 /// Splits a job so that no piece has more than `budget` rays, and no invocation
 /// more than `most`.
-fn pieces(places: u32, rays: u32, most: u32, budget: u64) -> Vec<Piece> {
+pub(super) fn pieces(places: u32, rays: u32, most: u32, budget: u64) -> Vec<Piece> {
     let ray_step = rays.clamp(1, most);
     // Whole workgroups, at most 65,535 a dispatch.
     let groups = (budget / u64::from(ray_step * WORKGROUP)).clamp(1, 65_535) as u32;

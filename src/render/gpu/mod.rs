@@ -6,6 +6,7 @@ mod loaded;
 mod params;
 mod query;
 mod raster;
+mod screen_space;
 mod timing;
 
 use super::{Geometry, Loaded, RenderError, Renderer};
@@ -34,6 +35,14 @@ const SHADER: &str = concat!(
     include_str!("shaders/sampler.wgsl"),
     include_str!("shaders/ao.wgsl"),
     include_str!("shaders/indirect.wgsl")
+);
+
+/// The shader of screen space.
+const SCREEN_SPACE: &str = concat!(
+    include_str!("shaders/sampler.wgsl"),
+    include_str!("shaders/screen_space.wgsl"),
+    include_str!("shaders/hbao.wgsl"),
+    include_str!("shaders/gtao.wgsl")
 );
 
 /// Values of a shader's `override` constants by name. What a whole dispatch shares
