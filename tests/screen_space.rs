@@ -4,13 +4,19 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
 
 use aogauge::{
-    metrics::regions::{Region, Regions},
+    metrics::{
+        MetricName,
+        regions::{Region, Regions},
+    },
+    record::{Machine, RecordFolder},
     render::{
         Estimator, Falloff, Frame, Geometry, Job, RenderError, Renderer, ScreenSpace, cpu::Cpu, gbuffer::GBuffer,
         gpu::Gpu, screen_space::Integral,
     },
+    run::{Observer, Prepared},
     scenes::{Scene, View, library},
     screen_camera::screen_camera,
+    suite::{Plan, Platform, Suite},
 };
 use glam::Vec3;
 
@@ -138,8 +144,8 @@ fn a_measure_view_is_gathered_from_its_camera() {
         let pixel = at.y as usize * camera.resolution[0] as usize + at.x as usize;
         assert_eq!(value.to_bits(), whole.values[pixel].to_bits());
     }
-    // From the hem's other side: what the curtain hides is not guessed at.
-    let high = View::perspective(Vec3::new(0.6, 0.9, 0.0), Vec3::ZERO, Vec3::Y, 0.9, [256, 256]);
+    // From higher up: what the curtain hides is not guessed at.
+    let high = View::perspective(Vec3::new(0.5, 0.9, 0.0), Vec3::ZERO, Vec3::Y, 0.9, [256, 256]);
     let frame = stage.render(&Cpu, &stage.job(&view, Some(&high), ScreenSpace::GTAO, 1));
     let nan = |region| regions.pixels(region).iter().filter(|&&i| frame.values[i as usize].is_nan()).count();
     assert!(nan(Region::Left) > 400 && nan(Region::Right) == 0, "{} {}", nan(Region::Left), nan(Region::Right));
@@ -208,4 +214,93 @@ fn the_gpu_sees_what_the_cpu_sees() {
     }
     println!("{differ} of {pixels} pixels differ by more than 2e-3; the most by {worst}");
     assert!(differ * 10_000 <= pixels, "{differ} of {pixels}, the most by {worst}");
+}
+
+struct Silent;
+
+impl Observer for Silent {
+    fn step(&self, _done: usize, _total: usize, _what: &str) {}
+}
+
+/// Half a centimetre under the hem no camera sees the far flank: metrics that
+/// need it are null and say why, those of ray traced methods are not, and the
+/// report tells how much was seen.
+#[test]
+fn what_no_camera_sees_is_not_measured() {
+    let dir = tempfile::tempdir().unwrap();
+    let low = r#"
+description = "A hem just over the ground."
+ao = { radius = 0.25 }
+environment = { radiance = 1.0 }
+measure = { center = [0, 0, 0], normal = [0, 1, 0], transect = [1, 0, 0], clearance = 0.004, resolution = [208, 16] }
+look = { eye = [0.9, 0.45, 1.25], target = [0, 0, 0], resolution = [32, 16] }
+[[object]]
+name = "ground"
+shape = { plane = { center = [0, 0, 0], u = [0, 0, 6], v = [6, 0, 0] } }
+[[object]]
+name = "curtain"
+occluder = true
+shape = { curtain = { thickness = 0.02, gap = 0.005, height = 1.0, length = 6.0 } }
+"#;
+    std::fs::write(dir.path().join("low.toml"), low).unwrap();
+    let suite = r#"
+description = "x"
+scenes = ["low.toml"]
+rays = [2]
+replicates = 2
+converged_rays = 8
+look_rays = 1
+judge = { paths = 1, replicates = 2, max_replicates = 2 }
+[[estimator]]
+name = "classic"
+kind = "classic"
+[[estimator]]
+name = "gtao"
+kind = "gtao"
+"#;
+    let suite = Suite::from_toml("x", "x.toml", suite, dir.path()).unwrap();
+    let plan = Plan::new(&suite, Platform::Cpu, None);
+    let folder = RecordFolder::create(&dir.path().join("out")).unwrap();
+    let machine = Machine::here("a test".into(), None);
+    let record = Prepared::new(&plan).unwrap().run(&Cpu, None, None, machine, &folder, &Silent).unwrap();
+    let screen = record.scenes[0].screen.as_ref().unwrap();
+    let flanks = [Region::Left, Region::Right].map(|r| (screen.regions[&r], record.scenes[0].regions[&r]));
+    assert!(flanks.iter().any(|(shown, of)| *shown < 64 && *of == 256), "{flanks:?}");
+    assert!(flanks.iter().any(|(shown, of)| shown == of), "{flanks:?}");
+    let contrast = |case: usize| record.cases[case].metric(MetricName::Contrast, None).unwrap();
+    assert!(contrast(0).value.is_some());
+    assert!(contrast(1).value.is_none() && contrast(1).note.as_deref().unwrap().contains("fewer than 64"));
+    aogauge::report::write(folder.path(), folder.path()).unwrap();
+    let report = std::fs::read_to_string(folder.path().join("report.md")).unwrap();
+    assert!(report.contains("Screen-space methods are computed") && report.contains("of 256"), "{report}");
+}
+
+#[test]
+fn the_command_line_takes_it_and_names_what_is_wrong() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("g.exr");
+    let render = |args: &[&str]| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_aogauge"));
+        command.args(["render", "curtain-open", "--rays", "2", "--out"]).arg(&out).args(args);
+        let output = command.output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    for args in [
+        &["--estimator", "gtao", "--view", "look"][..],
+        &["--estimator", "hbao", "--set", "tangent_bias=30", "--set", "falloff=step"],
+        &["--preset", "xegtao-high", "--set", "steps=2"],
+    ] {
+        assert_eq!(render(args).0, Some(0), "{args:?}");
+    }
+    let layers = aogauge::layers::Layers::read(&out).unwrap();
+    let shown = layers.get("mean").unwrap().iter().filter(|v| !v.is_nan()).count();
+    assert!((1000..6656).contains(&shown), "{shown} of {:?}", layers.resolution);
+    for (option, says) in [
+        ("steps=65", "steps is 65: it must be from 1 to 64"),
+        ("tangent_bias=3", "tangent_bias means nothing for kind 'gtao'"),
+        ("secondary_rays=3", "secondary_rays means nothing for kind 'gtao'"),
+    ] {
+        let (code, message) = render(&["--estimator", "gtao", "--set", option]);
+        assert!(code == Some(2) && message.contains(says), "{option}: {code:?} {message}");
+    }
 }

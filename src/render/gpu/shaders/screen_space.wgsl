@@ -73,8 +73,8 @@ struct Point {
 fn new_point(pixel: u32) -> Point {
     let surface = surfaces[pixel];
     let perspective = params.perspective != 0u;
-    let from = surface.point - params.eye;
-    let to_eye = normalize(select(params.backwards, -from, perspective));
+    let from_eye = surface.point - params.eye;
+    let to_eye = normalize(select(params.backwards, -from_eye, perspective));
     let frame = tangents(to_eye);
     let width = params.resolution.x;
     let row = vec3<f32>(params.to_image_x.z, params.to_image_y.z, params.to_image_z.z);
@@ -82,7 +82,7 @@ fn new_point(pixel: u32) -> Point {
         surface.point,
         pixel,
         surface.normal,
-        select(1.0, dot(row, from), perspective),
+        select(1.0, dot(row, from_eye), perspective),
         to_eye,
         frame[0],
         frame[1],
