@@ -65,7 +65,7 @@ pub(super) struct Method {
     /// An option of the method as in a suite file, KEY=VALUE; may be repeated.
     /// Keys: falloff, faces, intensity, radius, secondary_radius, receiver_plane,
     /// secondary_rays, secondary_sides, secondary_origin, steps, sample_power,
-    /// radius_multiplier, tangent_bias.
+    /// radius_multiplier, tangent_bias, thickness.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub options: Vec<String>,
     /// Rays, or paths, a pixel, or slices in screen space; the preset's, or 64.
@@ -246,7 +246,7 @@ fn method(args: &Method, unless_given: Kind) -> Result<(Estimator, Option<u32>),
 }
 
 /// What `--set` takes.
-const OPTIONS: [&str; 13] = [
+const OPTIONS: [&str; 14] = [
     "falloff",
     "faces",
     "intensity",
@@ -260,6 +260,7 @@ const OPTIONS: [&str; 13] = [
     "sample_power",
     "radius_multiplier",
     "tangent_bias",
+    "thickness",
 ];
 
 fn frames(args: &Args, scene: &Scene, estimator: Estimator, rays: u32) -> Result<Vec<Frame>, Failure> {

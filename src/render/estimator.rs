@@ -278,7 +278,7 @@ impl Estimator {
             Estimator::LocalIndirect(_) => Kind::LocalIndirect,
             Estimator::ScreenSpace(s) => match s.integral {
                 Integral::Hbao { .. } => Kind::Hbao,
-                Integral::Gtao => Kind::Gtao,
+                Integral::Gtao { .. } => Kind::Gtao,
             },
             Estimator::PathTraced => Kind::PathTraced,
         }

@@ -77,6 +77,10 @@ pub struct EstimatorFile {
     /// nothing; degrees, 0 to below 90, 10 unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tangent_bias: Option<f32>,
+    /// For `gtao` with falloff `step`: what the image shows is this thick along
+    /// the line of sight, metres; endless unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thickness: Option<f32>,
 }
 
 /// The paper's number.
@@ -155,6 +159,7 @@ impl EstimatorFile {
             sample_power: self.sample_power.or(base.sample_power),
             radius_multiplier: self.radius_multiplier.or(base.radius_multiplier),
             tangent_bias: self.tangent_bias.or(base.tangent_bias),
+            thickness: self.thickness.or(base.thickness),
         })
     }
 
@@ -178,6 +183,7 @@ impl EstimatorFile {
             ("sample_power", self.sample_power.is_some(), screen),
             ("radius_multiplier", self.radius_multiplier.is_some(), screen),
             ("tangent_bias", self.tangent_bias.is_some(), kind == Kind::Hbao),
+            ("thickness", self.thickness.is_some(), kind == Kind::Gtao),
         ] {
             if given && !allowed {
                 return Err(format!("{field} means nothing for kind '{kind}'"));
@@ -235,11 +241,19 @@ impl EstimatorFile {
         ] {
             *value = between(field, given, 0.0, 16.0, "")?.unwrap_or(*value);
         }
-        if let (Integral::Hbao { tangent_bias }, Some(given)) = (&mut method.integral, self.tangent_bias) {
-            if !(0.0..90.0).contains(&given) {
-                return Err(format!("tangent_bias is {given} degrees: it must be at least 0 and below 90"));
+        match &mut method.integral {
+            Integral::Hbao { tangent_bias } => {
+                *tangent_bias = self.tangent_bias.unwrap_or(*tangent_bias);
+                if !(0.0..90.0).contains(tangent_bias) {
+                    return Err(format!("tangent_bias is {tangent_bias} degrees: it must be at least 0 and below 90"));
+                }
             }
-            *tangent_bias = given;
+            Integral::Gtao { thickness } => {
+                *thickness = between("thickness", self.thickness, 0.0, 1e6, " m")?;
+                if thickness.is_some() && method.falloff != Falloff::Step {
+                    return Err("thickness goes with falloff 'step' alone: a sector is open or closed".into());
+                }
+            }
         }
         Ok(method)
     }
@@ -247,9 +261,9 @@ impl EstimatorFile {
     /// With the options of a method in screen space that are not as they would be
     /// anyway.
     fn with_screen_space(self, s: &ScreenSpace) -> EstimatorFile {
-        let (usual, tangent_bias) = match s.integral {
-            Integral::Gtao => (ScreenSpace::GTAO, None),
-            Integral::Hbao { tangent_bias } => (ScreenSpace::HBAO, Some(tangent_bias)),
+        let (usual, tangent_bias, thickness) = match s.integral {
+            Integral::Gtao { thickness } => (ScreenSpace::GTAO, None, thickness),
+            Integral::Hbao { tangent_bias } => (ScreenSpace::HBAO, Some(tangent_bias), None),
         };
         EstimatorFile {
             falloff: Some(s.falloff).filter(|f| *f != usual.falloff),
@@ -259,6 +273,7 @@ impl EstimatorFile {
             sample_power: Some(s.sample_power).filter(|p| *p != usual.sample_power),
             radius_multiplier: Some(s.radius_multiplier).filter(|m| *m != usual.radius_multiplier),
             tangent_bias: tangent_bias.filter(|_| s.integral != usual.integral),
+            thickness,
             ..self
         }
     }
@@ -364,6 +379,7 @@ mod tests {
             "kind = 'local-indirect'\nfalloff = { exponential = { extinction = 4.0 } }",
             "kind = 'path-traced'",
             "kind = 'hbao'",
+            "kind = 'gtao'\nthickness = 0.02",
             "kind = 'hbao'\ntangent_bias = 30.0\nfalloff = 'step'\nsteps = 4",
             "kind = 'gtao'\nradius_multiplier = 1.457\nfalloff = { linear-tail = { tail = 0.615 } }\nsample_power = 2\n\
              intensity = 2.2\nradius = 0.5\nsteps = 3",
@@ -398,6 +414,9 @@ mod tests {
             ("kind = 'gtao'\nfaces = 'front'", "faces means nothing for kind 'gtao'"),
             ("kind = 'gtao'\ntangent_bias = 10", "tangent_bias means nothing for kind 'gtao'"),
             ("kind = 'hbao'\ntangent_bias = 90", "tangent_bias is 90 degrees"),
+            ("kind = 'hbao'\nthickness = 1", "thickness means nothing for kind 'hbao'"),
+            ("kind = 'gtao'\nthickness = 0", "thickness is 0 m"),
+            ("kind = 'gtao'\nthickness = 1\nfalloff = 'quadratic'", "falloff 'step' alone"),
             ("kind = 'hbao'\nsteps = 65", "steps is 65: it must be from 1 to 64"),
             ("kind = 'hbao'\nsample_power = 0", "sample_power is 0"),
             ("kind = 'hbao'\nradius_multiplier = 0", "radius_multiplier is 0"),

@@ -10,7 +10,7 @@ use crate::{
     render::{
         Falloff, Frame, Job, RenderError, ScreenSpace,
         gbuffer::GBuffer,
-        screen_space::{Integral, Screen, UNSEEN, bias},
+        screen_space::{Integral, SECTORS, Screen, UNSEEN, bias},
     },
     trace::Tracer,
 };
@@ -47,7 +47,9 @@ struct Params {
     falloff: u32,
     tail: f32,
     bias: [f32; 2],
-    unused: [u32; 2],
+    /// 0 for endless.
+    thickness: f32,
+    unused: u32,
 }
 
 /// A view with its camera on the device.
@@ -117,10 +119,11 @@ impl Rendering<'_> {
     /// Renders one replicate, no more than `budget` depth samples a dispatch.
     pub fn render(&self, job: &Job<'_>, method: &ScreenSpace, budget: u64) -> Result<Frame, RenderError> {
         let (device, on) = (&self.gpu.device, self.on);
-        let samples = method.steps * method.sides();
+        let sectors = if matches!(method.integral, Integral::Gtao { thickness: Some(_) }) { SECTORS } else { 0 };
+        let samples = method.steps * method.sides() + sectors;
         let slices = (SAMPLES_AN_INVOCATION / samples).max(1);
         let pieces = pieces(on.screen.gathered.len() as u32, job.rays, slices, budget / u64::from(samples));
-        let entry = if method.integral == Integral::Gtao { "gtao" } else { "hbao" };
+        let entry = if matches!(method.integral, Integral::Gtao { .. }) { "gtao" } else { "hbao" };
         let kernel = self.gpu.kernel(SCREEN_SPACE, entry)?;
         let start = Instant::now();
         device.guarded(|| {
@@ -175,6 +178,10 @@ fn params(screen: &Screen, job: &Job<'_>, method: &ScreenSpace, (pixels, slices)
         Falloff::LinearTail { tail } => (2, tail),
         _ => (0, 0.0),
     };
+    let (lifted, thickness) = match method.integral {
+        Integral::Hbao { tangent_bias } => (bias(tangent_bias), 0.0),
+        Integral::Gtao { thickness } => ([1.0, 0.0], thickness.unwrap_or(0.0)),
+    };
     let column = |v: Vec3| v.extend(0.0).to_array();
     let m = screen.to_image.to_image;
     Params {
@@ -194,10 +201,8 @@ fn params(screen: &Screen, job: &Job<'_>, method: &ScreenSpace, (pixels, slices)
         sample_power: method.sample_power,
         falloff,
         tail,
-        bias: match method.integral {
-            Integral::Hbao { tangent_bias } => bias(tangent_bias),
-            Integral::Gtao => [1.0, 0.0],
-        },
-        unused: [0; 2],
+        bias: lifted,
+        thickness,
+        unused: 0,
     }
 }

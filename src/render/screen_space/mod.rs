@@ -5,6 +5,8 @@
 mod gtao;
 mod hbao;
 
+pub use gtao::SECTORS;
+
 use super::{
     Falloff, Job, RenderError,
     ao::tangents,
@@ -49,7 +51,11 @@ pub enum Integral {
         tangent_bias: f32,
     },
     /// Cosine-weighted, by slices (Jimenez et al. 2016).
-    Gtao,
+    Gtao {
+        /// What the image shows is taken to be this thick along the line of sight,
+        /// metres (with [`Falloff::Step`] only); None for endless.
+        thickness: Option<f32>,
+    },
 }
 
 impl ScreenSpace {
@@ -62,7 +68,7 @@ impl ScreenSpace {
 
     /// GTAO without falloff: what lies within R counts in full.
     pub const GTAO: ScreenSpace = ScreenSpace {
-        integral: Integral::Gtao,
+        integral: Integral::Gtao { thickness: None },
         steps: 8,
         sample_power: 1,
         falloff: Falloff::Step,
@@ -78,7 +84,7 @@ impl ScreenSpace {
 
     /// How many directions a slice looks along.
     pub fn sides(&self) -> u32 {
-        if self.integral == Integral::Gtao { 2 } else { 1 }
+        if matches!(self.integral, Integral::Gtao { .. }) { 2 } else { 1 }
     }
 
     /// Openness from a sum over slices.
@@ -169,7 +175,7 @@ impl Screen {
                 let place = sampler.pair(i, 0);
                 match method.integral {
                     Integral::Hbao { tangent_bias } => hbao::direction(&point, method, bias(tangent_bias), place),
-                    Integral::Gtao => gtao::slice(&point, method, place),
+                    Integral::Gtao { thickness } => gtao::slice(&point, method, thickness, place),
                 }
             };
             method.mean((0..job.rays).map(|i| f64::from(slice(i))).sum(), job.rays)
@@ -232,9 +238,10 @@ struct Way {
     recede: f32,
 }
 
-/// A horizon: the cosine of its angle to the line of sight, and how much it
-/// counts.
+/// A horizon: where it lies from the point, the cosine of its angle to the line of
+/// sight, and how much it counts.
 struct Horizon {
+    there: Vec3,
     cosine: f32,
     weight: f32,
 }
@@ -289,8 +296,23 @@ impl<'a> Point<'a> {
         if distance > self.radius || self.normal.dot(there) <= FLAT * distance {
             return None;
         }
-        let cosine = (self.to_eye.dot(there) / distance).clamp(-1.0, 1.0);
-        Some(Horizon { cosine, weight: 1.0 - falloff.mu(distance, self.radius) })
+        Some(Horizon { there, cosine: self.cosine(there), weight: 1.0 - falloff.mu(distance, self.radius) })
+    }
+
+    /// Of the angle between a vector and the line of sight.
+    fn cosine(&self, there: Vec3) -> f32 {
+        (self.to_eye.dot(there) / there.length()).clamp(-1.0, 1.0)
+    }
+
+    /// The same vector, this much further from the eye, metres.
+    fn behind(&self, there: Vec3, thickness: f32) -> Vec3 {
+        let screen = self.screen;
+        let away = if screen.to_image.perspective {
+            self.point + there - screen.camera.origin
+        } else {
+            screen.camera.direction
+        };
+        there + away.normalize() * thickness
     }
 
     /// Where sample `j` lies on its way, metres.

@@ -25,7 +25,9 @@ struct Params {
     tail: f32,
     // Cosine and sine of the tangent bias.
     bias: vec2<f32>,
-    unused: vec2<u32>,
+    // Of what the image shows, along the line of sight; 0 for endless.
+    thickness: f32,
+    unused: u32,
 }
 
 struct Surface {
@@ -118,13 +120,23 @@ fn weight(d: f32) -> f32 {
 }
 
 struct Horizon {
+    there: vec3<f32>,
     seen: bool,
     cosine: f32,
     weight: f32,
 }
 
+fn cosine_of(point: Point, there: vec3<f32>) -> f32 {
+    return clamp(dot(point.to_eye, there) / length(there), -1.0, 1.0);
+}
+
+fn behind(point: Point, there: vec3<f32>, thickness: f32) -> vec3<f32> {
+    let away = select(-params.backwards, point.point + there - params.eye, params.perspective != 0u);
+    return there + normalize(away) * thickness;
+}
+
 fn horizon(point: Point, on: Way, r: f32) -> Horizon {
-    let none = Horizon(false, 0.0, 0.0);
+    let none = Horizon(vec3<f32>(), false, 0.0, 0.0);
     let depth = point.depth + on.recede * r;
     if depth <= 0.0 {
         return none;
@@ -144,7 +156,7 @@ fn horizon(point: Point, on: Way, r: f32) -> Horizon {
     if distance > params.radius || dot(point.normal, there) <= FLAT * distance {
         return none;
     }
-    return Horizon(true, clamp(dot(point.to_eye, there) / distance, -1.0, 1.0), weight(distance));
+    return Horizon(there, true, cosine_of(point, there), weight(distance));
 }
 
 fn sample_place(j: u32, jitter: f32) -> f32 {
