@@ -118,7 +118,7 @@ fn hbao_in_a_corner_darkens_towards_the_wall() {
     let points = stage.points(&stage.view);
     let profile = |method: ScreenSpace| -> Vec<f64> {
         let frame = stage.render(&Cpu, &stage.job(&stage.view, None, method, 32));
-        let mut bins = vec![(0.0, 0.0); 6];
+        let mut bins = [(0.0, 0.0); 6];
         for (surface, value) in points.surfaces.iter().zip(&frame.values) {
             let Some(s) = surface.filter(|s| s.normal.y > 0.9 && s.point.z.abs() < 0.3) else { continue };
             let k = (s.point.x / stage.scene.ao.radius * 5.0) as usize;
