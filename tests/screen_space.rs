@@ -91,7 +91,7 @@ fn gtao_in_a_corner_meets_the_closed_form() {
 }
 
 fn corner(stage: &Stage, method: ScreenSpace, tolerance: f64) {
-    let frame = stage.render(&Cpu, &stage.job(&stage.view, None, method, 64));
+    let frame = stage.render(&Cpu, &stage.job(&stage.view, None, method, 16));
     let mut bins = [(0.0f64, 0.0f64, 0u32); 10];
     for (surface, value) in stage.points(&stage.view).surfaces.iter().zip(&frame.values) {
         let Some(s) = surface.filter(|s| s.normal.y > 0.9 && s.point.z.abs() < 0.2) else { continue };
@@ -219,12 +219,12 @@ fn the_gpu_sees_what_the_cpu_sees() {
                 }
             }
         }
-        // More slices than one dispatch takes.
-        let job = stage.job(&measure, Some(&camera), ScreenSpace { steps: 64, ..ScreenSpace::GTAO }, 100);
-        let (a, b) = (on_cpu.render(&job).unwrap(), on_gpu.render(&job).unwrap());
-        let mean = |f: &Frame| f.values.iter().filter(|v| !v.is_nan()).map(|&v| f64::from(v)).sum::<f64>() / 1e4;
-        assert!((mean(&a) - mean(&b)).abs() < 1e-4, "{} {}", mean(&a), mean(&b));
     }
+    // More slices than one dispatch takes.
+    let stage = Stage::new("curtain-arcade", [48, 32]);
+    let job = stage.job(&stage.view, None, ScreenSpace { steps: 64, ..ScreenSpace::GTAO }, 70);
+    let (a, b) = (stage.render(&Cpu, &job), stage.render(&gpu, &job));
+    assert!(a.values.iter().zip(&b.values).all(|(a, b)| (a - b).abs() < 1e-4 || (a.is_nan() && b.is_nan())));
     println!("{differ} of {pixels} pixels differ by more than 2e-3; the most by {worst}");
     assert!(differ * 10_000 <= pixels, "{differ} of {pixels}, the most by {worst}");
 }
@@ -316,4 +316,10 @@ fn the_command_line_takes_it_and_names_what_is_wrong() {
         let (code, message) = render(&["--estimator", "gtao", "--set", option]);
         assert!(code == Some(2) && message.contains(says), "{option}: {code:?} {message}");
     }
+}
+
+#[test]
+fn the_committed_suite_loads() {
+    let suite = Suite::load("reports/screen-space/suite.toml").unwrap();
+    assert_eq!((suite.scenes.len(), suite.methods.len(), suite.gates.len()), (5, 7, 9));
 }
