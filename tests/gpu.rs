@@ -121,6 +121,7 @@ fn all_options_agree_ray_by_ray() {
     methods.push(extended(Falloff::Step, 3, Sides::One, middle));
     methods.push(extended(Falloff::Step, 8, Sides::Two, jittered));
     methods.push(extended(falloffs[0], 5, Sides::One, jittered));
+    methods.push(Openness::plain(Falloff::Quadratic));
     methods.push(Openness { faces: Faces::Front, ..step });
     methods.push(Openness { faces: Faces::Front, ..extended(falloffs[1], 2, Sides::Two, middle) });
     methods.push(Openness { intensity: 1.7, scale: Scale { radius: Some(0.4), secondary_radius: None }, ..step });
