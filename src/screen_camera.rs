@@ -30,7 +30,7 @@ const SAMPLES: usize = 1024;
 const ELEVATIONS: [f32; 5] = [30.0, 20.0, 40.0, 50.0, 12.0];
 const AZIMUTHS: [f32; 5] = [0.0, 30.0, -30.0, 60.0, -60.0];
 
-/// The camera of a scene: the first that sees [`ENOUGH`] of footprint and both
+/// The camera of a scene: the first that sees 98 % of footprint and both
 /// flanks, else the one that sees the most of the region it sees least of. Tried
 /// are the eye of the look view, then places on the side of the left and of the
 /// right flank. All look at the middle of the regions, with 1.5 R around them in

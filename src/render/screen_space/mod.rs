@@ -185,7 +185,7 @@ impl Screen {
 }
 
 /// Cosine and sine of an angle in degrees.
-pub fn bias(degrees: f32) -> [f32; 2] {
+pub(in crate::render) fn bias(degrees: f32) -> [f32; 2] {
     let (sin, cos) = f64::from(degrees).to_radians().sin_cos();
     [cos as f32, sin as f32]
 }
