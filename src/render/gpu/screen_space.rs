@@ -161,8 +161,8 @@ impl Rendering<'_> {
         timer: Option<&Timer>,
     ) {
         let (device, on) = (&self.gpu.device, self.on);
-        let buffers = [(0, &on.params), (1, &on.surfaces), (2, &on.gathered), (3, &on.sums)];
-        let group = device.bind(kernel, &buffers);
+        let buffers = [&on.params, &on.surfaces, &on.gathered, &on.sums].map(wgpu::Buffer::as_entire_binding);
+        let group = device.bind(kernel, &(0..).zip(buffers).collect::<Vec<_>>());
         for (slot, piece) in (0..).zip(pieces) {
             let params = params(&on.screen, job, method, piece);
             device.queue.write_buffer(&on.params, 0, bytemuck::bytes_of(&params));
