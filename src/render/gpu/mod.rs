@@ -176,7 +176,9 @@ impl Gpu {
             return Ok(kernel.clone());
         }
         let values: Vec<(&str, f64)> = key.2.iter().map(|&(name, value)| (name, f64::from(value))).collect();
-        let kernel = Arc::new(self.device.kernel(&[self.trace(), source].concat(), entry, &values)?);
+        // Screen space traces no ray.
+        let trace = if source == SCREEN_SPACE { "" } else { self.trace() };
+        let kernel = Arc::new(self.device.kernel(&[trace, source].concat(), entry, &values)?);
         kernels.insert(key, kernel.clone());
         Ok(kernel)
     }
