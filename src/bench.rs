@@ -120,6 +120,7 @@ pub fn scene(gpu: &Gpu, scene: &Scene, settings: &Settings, tell: impl FnMut(u32
         .iter()
         .map(|&(rays, _, estimator)| Job {
             view: &view,
+            camera: None,
             estimator,
             ao: scene.ao,
             rays,

@@ -16,6 +16,7 @@ pub mod record;
 pub mod render;
 pub mod report;
 pub mod run;
+pub mod screen_camera;
 pub mod stats;
 pub mod suite;
 pub mod trace;

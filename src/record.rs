@@ -192,6 +192,10 @@ pub struct SceneRecord {
     pub brighter: BTreeMap<String, Brighter>,
     /// The judge; null where there is no occluder to judge.
     pub judge: Option<JudgeRecord>,
+    /// Where screen-space methods are computed, and how much of each region is
+    /// seen from there; absent in suites without such methods.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub screen: Option<ScreenRecord>,
     /// Why there is no judge.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub no_judge: Option<String>,
@@ -201,6 +205,19 @@ pub struct SceneRecord {
     pub image: String,
     /// Pictures from the look view, relative to the record.
     pub look: String,
+}
+
+/// The camera of screen-space methods. Their metrics, and the judge and classic AO
+/// beside them, are taken over the pixels whose points it shows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ScreenRecord {
+    /// Its position, metres from the centre of the measure view.
+    pub eye: [f64; 3],
+    /// Width and height of its image, pixels.
+    pub resolution: [u32; 2],
+    /// Pixels of each region that it shows.
+    pub regions: BTreeMap<Region, usize>,
 }
 
 /// What the judge found.

@@ -324,7 +324,7 @@ fn an_r_below_rounding_is_refused() {
     for radius in [1e-3f32, 1e-9] {
         let scale = Scale { radius: Some(radius), secondary_radius: None };
         let estimator = Estimator::Openness(Openness { scale, ..Openness::plain(Falloff::Step) });
-        let job = Job { view: &view, estimator, ao: scene.ao, rays: 1, seed: 2, replicate: 0 };
+        let job = Job { view: &view, camera: None, estimator, ao: scene.ao, rays: 1, seed: 2, replicate: 0 };
         let message = Cpu.load(&geometry).unwrap().render(&job).unwrap_err().to_string();
         assert!(message.contains(&format!("R = {radius} m")), "{message}");
     }
@@ -394,7 +394,7 @@ fn variance_of_light_falls_with_the_number_of_paths() {
             let mut loaded = Cpu.load(&geometry).unwrap();
             let frames: Vec<Vec<f32>> = (0..32)
                 .map(|replicate| {
-                    let job = Job { view: &view, estimator, ao: scene.ao, rays, seed: 2, replicate };
+                    let job = Job { view: &view, camera: None, estimator, ao: scene.ao, rays, seed: 2, replicate };
                     loaded.render(&job).unwrap().values
                 })
                 .collect();
@@ -438,7 +438,7 @@ fn scale_and_place_do_not_matter() {
         let scene = scene.near_origin();
         let geometry = Geometry::new(&scene).unwrap();
         let view = scene.measure.view();
-        let job = Job { view: &view, estimator, ao: scene.ao, rays: 16, seed: 2, replicate: 0 };
+        let job = Job { view: &view, camera: None, estimator, ao: scene.ao, rays: 16, seed: 2, replicate: 0 };
         Cpu.load(&geometry).unwrap().render(&job).unwrap().values
     };
     for estimator in [
@@ -488,7 +488,7 @@ fn boxes_stay_closed_and_planes_open_at_every_scale_and_place() {
             let view = near.measure.view();
             for method in methods().into_iter().filter(|m| m.falloff == Falloff::Step && m.faces == Faces::Both) {
                 let estimator = Estimator::Openness(method);
-                let job = Job { view: &view, estimator, ao: near.ao, rays: 64, seed: 2, replicate: 0 };
+                let job = Job { view: &view, camera: None, estimator, ao: near.ao, rays: 64, seed: 2, replicate: 0 };
                 let values = Cpu.load(&geometry).unwrap().render(&job).unwrap().values;
                 assert!(values.iter().all(|&v| v == expected), "{expected} x{factor} +{offset} R: {method:?}");
             }
@@ -537,7 +537,7 @@ fn local_indirect_light_has_its_closed_forms() {
     let view = scene.measure.view();
     let method = LocalIndirect { falloff: Falloff::Step, scale: Scale::default() };
     let estimator = Estimator::LocalIndirect(method);
-    let job = Job { view: &view, estimator, ao: scene.ao, rays: 64, seed: 2, replicate: 0 };
+    let job = Job { view: &view, camera: None, estimator, ao: scene.ao, rays: 64, seed: 2, replicate: 0 };
     let colors = Cpu.load(&geometry).unwrap().render(&job).unwrap().colors.unwrap();
     for (c, (albedo, emission)) in [(0.8, 0.1), (0.4, 0.2), (0.1, 0.3)].into_iter().enumerate() {
         let values: Vec<f64> = colors.iter().map(|v| f64::from(v[c])).collect();
@@ -569,7 +569,15 @@ fn no_light_is_made() {
     let mut loaded = Cpu.load(&geometry).unwrap();
     let means: Vec<f64> = (0..24)
         .map(|replicate| {
-            let job = Job { view: &view, estimator: Estimator::PathTraced, ao: scene.ao, rays: 64, seed: 5, replicate };
+            let job = Job {
+                view: &view,
+                camera: None,
+                estimator: Estimator::PathTraced,
+                ao: scene.ao,
+                rays: 64,
+                seed: 5,
+                replicate,
+            };
             let values = loaded.render(&job).unwrap().values;
             assert!(values.iter().all(|v| v.is_finite() && *v >= 0.0));
             values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64
@@ -592,7 +600,7 @@ fn color_bleeds_from_a_wall() {
     let view = scene.measure.view();
     let method = LocalIndirect { falloff: Falloff::Step, scale: Scale::default() };
     let estimator = Estimator::LocalIndirect(method);
-    let job = Job { view: &view, estimator, ao: scene.ao, rays: 256, seed: 2, replicate: 0 };
+    let job = Job { view: &view, camera: None, estimator, ao: scene.ao, rays: 256, seed: 2, replicate: 0 };
     let colors = Cpu.load(&geometry).unwrap().render(&job).unwrap().colors.unwrap();
     let near = colors[8 * 208 + 112];
     assert!(near[0] > near[1] + 0.1 && (near[1] - near[2]).abs() < 1e-6, "{near:?}");

@@ -86,7 +86,7 @@ fn compare(name: &str, view: impl Fn(&Scene) -> View, rays: u32, estimators: &[E
         let exact = ESTIMATORS.contains(&estimator);
         let mut tally = Tally { exact, ..Tally::default() };
         for replicate in 0..2 {
-            let job = Job { view: &view, estimator, ao: scene.ao, rays, seed: 9, replicate };
+            let job = Job { view: &view, camera: None, estimator, ao: scene.ao, rays, seed: 9, replicate };
             tally.add(&on_cpu.render(&job).unwrap(), &on_gpu.render(&job).unwrap(), &job);
         }
         tally.check(&format!("{name}, {estimator:?}"));
@@ -121,6 +121,7 @@ fn all_options_agree_ray_by_ray() {
     methods.push(extended(Falloff::Step, 3, Sides::One, middle));
     methods.push(extended(Falloff::Step, 8, Sides::Two, jittered));
     methods.push(extended(falloffs[0], 5, Sides::One, jittered));
+    methods.push(Openness::plain(Falloff::Quadratic));
     methods.push(Openness { faces: Faces::Front, ..step });
     methods.push(Openness { faces: Faces::Front, ..extended(falloffs[1], 2, Sides::Two, middle) });
     methods.push(Openness { intensity: 1.7, scale: Scale { radius: Some(0.4), secondary_radius: None }, ..step });
@@ -142,7 +143,7 @@ fn local_indirect_light_agrees_path_by_path() {
     for falloff in [Falloff::Step, Falloff::Exponential { extinction: 6.0 }] {
         let estimator = Estimator::LocalIndirect(LocalIndirect { falloff, scale: Scale::default() });
         let rays = 20;
-        let job = Job { view: &view, estimator, ao: scene.ao, rays, seed: 9, replicate: 0 };
+        let job = Job { view: &view, camera: None, estimator, ao: scene.ao, rays, seed: 9, replicate: 0 };
         let (a, b) = (on_cpu.render(&job).unwrap(), on_gpu.render(&job).unwrap());
         let differ = a.values.iter().zip(&b.values).filter(|(a, b)| (**a - **b).abs() > 1e-4).count();
         println!("{falloff:?}: {differ} of {} pixels", a.values.len());
@@ -161,7 +162,15 @@ fn what_the_gpu_does_not_compute_is_refused() {
     let scene = library::scene("plane").unwrap();
     let geometry = Geometry::new(&scene).unwrap();
     let view = scene.measure.view();
-    let job = Job { view: &view, estimator: Estimator::PathTraced, ao: scene.ao, rays: 4, seed: 1, replicate: 0 };
+    let job = Job {
+        view: &view,
+        camera: None,
+        estimator: Estimator::PathTraced,
+        ao: scene.ao,
+        rays: 4,
+        seed: 1,
+        replicate: 0,
+    };
     let message = gpu.load(&geometry).unwrap().render(&job).unwrap_err().to_string();
     assert!(message.contains("path-traced") && message.contains("gpu"), "{message}");
 }
@@ -180,7 +189,8 @@ fn split_jobs_add_up() {
     let scene = library::scene("thick-box").unwrap();
     let geometry = Geometry::new(&scene).unwrap();
     let view = View { resolution: [64, 16], ..scene.measure.view() };
-    let job = Job { view: &view, estimator: ESTIMATORS[1], ao: scene.ao, rays: 9_001, seed: 2, replicate: 1 };
+    let job =
+        Job { view: &view, camera: None, estimator: ESTIMATORS[1], ao: scene.ao, rays: 9_001, seed: 2, replicate: 1 };
     let on_cpu = Cpu.load(&geometry).unwrap().render(&job).unwrap();
     let on_gpu = gpu.load(&geometry).unwrap().render(&job).unwrap();
     let off: f64 = on_cpu.values.iter().zip(&on_gpu.values).map(|(a, b)| f64::from((a - b).abs())).sum();
@@ -195,7 +205,7 @@ fn large_views_are_split() {
     let scene = library::scene("curtain-open").unwrap();
     let geometry = Geometry::new(&scene).unwrap();
     let view = View { resolution: [4096, 1024], ..scene.measure.view() };
-    let job = Job { view: &view, estimator: ESTIMATORS[0], ao: scene.ao, rays: 1, seed: 2, replicate: 1 };
+    let job = Job { view: &view, camera: None, estimator: ESTIMATORS[0], ao: scene.ao, rays: 1, seed: 2, replicate: 1 };
     let on_cpu = Cpu.load(&geometry).unwrap().render(&job).unwrap();
     let on_gpu = gpu.load(&geometry).unwrap().render(&job).unwrap();
     let off =
@@ -216,7 +226,7 @@ fn checks_change_nothing() {
         let gpu = Gpu::with(Options { checks, ..Options::default() }).unwrap();
         let mut loaded = gpu.load(&geometry).unwrap();
         [ESTIMATORS[0], ESTIMATORS[1], ESTIMATORS[2], Estimator::Openness(step), indirect].map(|estimator| {
-            let job = Job { view: &view, estimator, ao: scene.ao, rays: 4, seed: 3, replicate: 0 };
+            let job = Job { view: &view, camera: None, estimator, ao: scene.ao, rays: 4, seed: 3, replicate: 0 };
             loaded.render(&job).unwrap().values.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
         })
     });
@@ -232,7 +242,7 @@ fn views_beyond_a_binding_are_refused() {
     let geometry = Geometry::new(&scene).unwrap();
     let mut loaded = gpu.load(&geometry).unwrap();
     let view = View { resolution: [65_535, 65_535], ..scene.measure.view() };
-    let job = Job { view: &view, estimator: ESTIMATORS[0], ao: scene.ao, rays: 1, seed: 1, replicate: 0 };
+    let job = Job { view: &view, camera: None, estimator: ESTIMATORS[0], ao: scene.ao, rays: 1, seed: 1, replicate: 0 };
     let error = loaded.render(&job).unwrap_err();
     assert!(matches!(error, RenderError::TooLarge { what: "surfaces", .. }), "{error}");
     assert!(loaded.render(&Job { view: &scene.measure.view(), ..job }).is_ok());
@@ -248,7 +258,7 @@ fn repeated_renders_are_identical() {
     let (measure, look) = (scene.measure.view(), scene.look.view());
     let ao = AoScale { radius: 0.3, secondary_radius: 0.05 };
     let mut render = |view| {
-        let job = Job { view, estimator: ESTIMATORS[2], ao, rays: 4, seed: 1, replicate: 0 };
+        let job = Job { view, camera: None, estimator: ESTIMATORS[2], ao, rays: 4, seed: 1, replicate: 0 };
         loaded.render(&job).unwrap().values.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
     };
     let first = render(&measure);

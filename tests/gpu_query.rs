@@ -42,7 +42,7 @@ fn compare(gpu: &Gpu, scene: &Scene, view: &View, rays: u32, methods: &[Openness
     let mut tally = Tally::default();
     for &method in methods {
         let estimator = Estimator::Openness(method);
-        let job = Job { view, estimator, ao: scene.ao, rays, seed: 3, replicate: 0 };
+        let job = Job { view, camera: None, estimator, ao: scene.ao, rays, seed: 3, replicate: 0 };
         let (a, b) = (on_cpu.render(&job).unwrap(), on_gpu.render(&job).unwrap());
         let (decided, by_query) = (a.decisions.unwrap(), b.decisions.unwrap());
         for i in 0..view.pixels() {
@@ -120,7 +120,7 @@ fn local_indirect_light_agrees() {
     let geometry = Geometry::new(&scene).unwrap();
     let view = View { resolution: [80, 20], ..scene.measure.view() };
     let estimator = Estimator::LocalIndirect(LocalIndirect { falloff: Falloff::Step, scale: Scale::default() });
-    let job = Job { view: &view, estimator, ao: scene.ao, rays: 8, seed: 9, replicate: 0 };
+    let job = Job { view: &view, camera: None, estimator, ao: scene.ao, rays: 8, seed: 9, replicate: 0 };
     let a = Cpu.load(&geometry).unwrap().render(&job).unwrap();
     let b = gpu.load(&geometry).unwrap().render(&job).unwrap();
     let differ = a.values.iter().zip(&b.values).filter(|(a, b)| (**a - **b).abs() > 1e-4).count();

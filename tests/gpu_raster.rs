@@ -50,7 +50,7 @@ fn distances(view: &View, corners: &[[Vec3; 3]], pixel: usize, triangles: [u32; 
 /// By rays, and by rasterisation.
 fn both(scene: &Scene, view: &View, estimator: Estimator) -> [Frame; 2] {
     let geometry = Geometry::new(scene).unwrap();
-    let job = Job { view, estimator, ao: scene.ao, rays: 4, seed: 5, replicate: 0 };
+    let job = Job { view, camera: None, estimator, ao: scene.ao, rays: 4, seed: 5, replicate: 0 };
     [GBufferBy::Rays, GBufferBy::Raster].map(|by| {
         let gpu = gpu(by);
         gpu.load(&geometry).unwrap().render(&job).unwrap()
@@ -193,7 +193,8 @@ fn what_cannot_be_drawn_is_refused() {
     assert!(gpu.describe().contains("rasterisation"), "{}", gpu.describe());
     let mut loaded = gpu.load(&geometry).unwrap();
     let mut render = |view: &View| {
-        let job = Job { view, estimator: Estimator::CLASSIC, ao: scene.ao, rays: 1, seed: 1, replicate: 0 };
+        let job =
+            Job { view, camera: None, estimator: Estimator::CLASSIC, ao: scene.ao, rays: 1, seed: 1, replicate: 0 };
         loaded.render(&job).map(|f| f.values.len())
     };
     let view = scene.measure.view();

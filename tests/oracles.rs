@@ -217,7 +217,8 @@ fn highlight_contrast_agrees_with_the_reference() {
             let name = column.strip_prefix("ext2_c_").unwrap_or("classic");
             let mut loaded = Cpu.load(&geometry).unwrap();
             let mut render = |seed: u32| -> Vec<Vec<f32>> {
-                let job = |replicate| Job { view: &view, estimator, ao: scene.ao, rays: 64, seed, replicate };
+                let job =
+                    |replicate| Job { view: &view, camera: None, estimator, ao: scene.ao, rays: 64, seed, replicate };
                 (0..4).map(|replicate| loaded.render(&job(replicate)).unwrap().values).collect()
             };
             let (replicates, converged) = (render(3), Converged::new(render(4)));
@@ -239,7 +240,7 @@ fn a_rendered_profile_follows_the_closed_form() {
     let scene = scene(&row);
     let geometry = Geometry::new(&scene).unwrap();
     let view = scene.measure.view();
-    let job = Job { view: &view, estimator: CLASSIC, ao: scene.ao, rays: 256, seed: 5, replicate: 0 };
+    let job = Job { view: &view, camera: None, estimator: CLASSIC, ao: scene.ao, rays: 256, seed: 5, replicate: 0 };
     let frame = Cpu.load(&geometry).unwrap().render(&job).unwrap();
     let slab = Slab { width: 0.02, gap: 0.05, height: 1.0 };
     for x in 0..208u32 {

@@ -29,7 +29,7 @@ fn every_legal_parameter_set_gives_a_scene_that_renders() {
                 let geometry = Geometry::new(&scene).unwrap_or_else(|e| panic!("{family}: {text}: {e}"));
                 let view = scene.look.view();
                 let estimator = Estimator::extended(ReceiverPlane::Clipped);
-                let job = Job { view: &view, estimator, ao: scene.ao, rays: 2, seed: 1, replicate: 0 };
+                let job = Job { view: &view, camera: None, estimator, ao: scene.ao, rays: 2, seed: 1, replicate: 0 };
                 let frame = Cpu.load(&geometry).unwrap().render(&job).unwrap();
                 let sound =
                     |(v, seen): (&f32, &u32)| if *seen == u32::MAX { v.is_nan() } else { (0.0..=1.0).contains(v) };

@@ -43,7 +43,7 @@ fn smoothed(method: Openness, temporal: Option<Temporal>, denoise: Option<Denois
 
 /// A job of four rays unless it says otherwise.
 fn job<'a>(scene: &Scene, view: &'a View, method: Openness) -> Job<'a> {
-    Job { view, estimator: Estimator::Openness(method), ao: scene.ao, rays: 4, seed: 11, replicate: 0 }
+    Job { view, camera: None, estimator: Estimator::Openness(method), ao: scene.ao, rays: 4, seed: 11, replicate: 0 }
 }
 
 fn bits(values: &[f32]) -> Vec<u32> {

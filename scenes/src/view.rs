@@ -43,6 +43,27 @@ impl View {
         )
     }
 
+    /// A perspective camera. `target` is the point at the centre of the image,
+    /// `up` points up in it and must not point along the line of sight, `fov` is
+    /// the vertical field of view, radians.
+    pub fn perspective(eye: Vec3, target: Vec3, up: Vec3, fov: f32, resolution: [u32; 2]) -> View {
+        let forward = (target - eye).normalize();
+        let right = forward.cross(up).normalize();
+        let up = right.cross(forward);
+        let [w, h] = resolution;
+        let pixel = 2.0 * (fov / 2.0).tan() / h as f32;
+        let (dx, dy) = (right * pixel, -up * pixel);
+        View {
+            resolution,
+            origin: eye,
+            origin_dx: Vec3::ZERO,
+            origin_dy: Vec3::ZERO,
+            direction: forward - dx * (w as f32 / 2.0) - dy * (h as f32 / 2.0),
+            direction_dx: dx,
+            direction_dy: dy,
+        }
+    }
+
     /// The same view with `times` the pixels, each way.
     #[must_use]
     pub fn finer(&self, times: u32) -> View {
@@ -184,21 +205,7 @@ pub struct LookView {
 impl LookView {
     /// As a camera, +Y up.
     pub fn view(&self) -> View {
-        let forward = (self.target - self.eye).normalize();
-        let right = forward.cross(Vec3::Y).normalize();
-        let up = right.cross(forward);
-        let [w, h] = self.resolution;
-        let pixel = 2.0 * (self.fov.to_radians() / 2.0).tan() / h as f32;
-        let (dx, dy) = (right * pixel, -up * pixel);
-        View {
-            resolution: self.resolution,
-            origin: self.eye,
-            origin_dx: Vec3::ZERO,
-            origin_dy: Vec3::ZERO,
-            direction: forward - dx * (w as f32 / 2.0) - dy * (h as f32 / 2.0),
-            direction_dx: dx,
-            direction_dy: dy,
-        }
+        View::perspective(self.eye, self.target, Vec3::Y, self.fov.to_radians(), self.resolution)
     }
 }
 

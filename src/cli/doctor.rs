@@ -237,7 +237,8 @@ fn trial(gpu: &Gpu) -> Result<(), String> {
     let scene = library::scene("curtain-open").map_err(|e| e.to_string())?;
     let geometry = Geometry::new(&scene).map_err(|e| e.to_string())?;
     let view = View { resolution: [64, 32], ..scene.measure.view() };
-    let job = Job { view: &view, estimator: Estimator::CLASSIC, ao: scene.ao, rays: 8, seed: 1, replicate: 0 };
+    let job =
+        Job { view: &view, camera: None, estimator: Estimator::CLASSIC, ao: scene.ao, rays: 8, seed: 1, replicate: 0 };
     let values = |renderer: &dyn Renderer| -> Result<Vec<f32>, String> {
         let frame = renderer.load(&geometry).and_then(|mut loaded| loaded.render(&job));
         Ok(frame.map_err(|e| e.to_string())?.values)

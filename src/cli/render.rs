@@ -3,9 +3,14 @@
 use super::{Exit, Failure, Format, json, on_gpu::OnGpu, print, scene::load, tell};
 use crate::{
     layers::Layers,
-    render::{Estimator, Frame, Geometry, Job, Kind, ReceiverPlane, RenderError, Renderer, cpu::Cpu, gpu::Gpu},
+    metrics::regions::Regions,
+    render::{
+        Estimator, Frame, Geometry, Job, Kind, ReceiverPlane, RenderError, Renderer, cpu::Cpu, gbuffer::GBuffer,
+        gpu::Gpu,
+    },
     report::picture,
     scenes::{Scene, View},
+    screen_camera::screen_camera,
     stats::mean_variance,
     suite::EstimatorFile,
 };
@@ -19,6 +24,7 @@ use std::path::{Path, PathBuf};
 aogauge render curtain-arcade --estimator extended --set receiver_plane=clipped --rays 256 --out extended.exr\n  \
 aogauge render curtain-room --estimator obscurance --set 'falloff={ exponential = { extinction = 4.0 } }' --out o.exr\n  \
 aogauge render curtain-room --rays 4 --set 'temporal={ motion = [0.7, 0.3] }' --set 'denoise={}' --out smooth.exr\n  \
+aogauge render curtain-arcade --estimator gtao --view look --out gtao.png\n  \
 aogauge render atrium --preset unity-high --view look --out unity.png\n  \
 aogauge render atrium --view look --renderer gpu --g-buffer raster --out hybrid.png\n  \
 aogauge render curtain-arcade --estimator path-traced --rays 1024 --replicates 8 --out judge.exr")]
@@ -53,15 +59,17 @@ pub(super) struct Method {
     #[arg(long, value_enum, conflicts_with = "preset")]
     pub estimator: Option<Kind>,
     /// A method as an engine or the paper sets it: unity-low, unity-medium,
-    /// unity-high, unreal-default, microsoft-sample, paper-4, paper-32.
+    /// unity-high, unreal-default, microsoft-sample, paper-4, paper-32,
+    /// xegtao-high.
     #[arg(long)]
     pub preset: Option<String>,
     /// An option of the method as in a suite file, KEY=VALUE; may be repeated.
     /// Keys: falloff, faces, intensity, radius, secondary_radius, receiver_plane,
-    /// secondary_rays, secondary_sides, secondary_origin, temporal, denoise.
+    /// secondary_rays, secondary_sides, secondary_origin, temporal, denoise, steps,
+    /// sample_power, radius_multiplier, tangent_bias, thickness.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub options: Vec<String>,
-    /// Rays, or paths, a pixel; the preset's, or 64.
+    /// Rays, or paths, a pixel, or slices in screen space; the preset's, or 64.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=65536))]
     rays: Option<u32>,
     /// Seed of all randomness.
@@ -239,7 +247,7 @@ fn method(args: &Method, unless_given: Kind) -> Result<(Estimator, Option<u32>),
 }
 
 /// What `--set` takes.
-const OPTIONS: [&str; 11] = [
+const OPTIONS: [&str; 16] = [
     "falloff",
     "faces",
     "intensity",
@@ -251,6 +259,11 @@ const OPTIONS: [&str; 11] = [
     "secondary_origin",
     "temporal",
     "denoise",
+    "steps",
+    "sample_power",
+    "radius_multiplier",
+    "tangent_bias",
+    "thickness",
 ];
 
 fn frames(args: &Args, scene: &Scene, estimator: Estimator, rays: u32) -> Result<Vec<Frame>, Failure> {
@@ -261,8 +274,23 @@ fn frames(args: &Args, scene: &Scene, estimator: Estimator, rays: u32) -> Result
     let gpu = args.method.gpu().map_err(fail)?;
     let renderer: &dyn Renderer = gpu.as_ref().map_or(&Cpu, |g| g);
     let mut loaded = renderer.load(&geometry).map_err(fail)?;
+    // The measure view's own depth buffer does not hold the occluder.
+    let measured = args.view == Which::Measure && matches!(estimator, Estimator::ScreenSpace(_));
+    let camera = measured.then(|| {
+        let points = GBuffer::new(&geometry.tracer, &view);
+        let regions = Regions::new(scene, &geometry.tracer, &points);
+        screen_camera(scene, &geometry.tracer, &points, &regions)
+    });
     let frame = |replicate| {
-        let job = Job { view: &view, estimator, ao: scene.ao, rays, seed: args.method.seed, replicate };
+        let job = Job {
+            view: &view,
+            camera: camera.as_ref(),
+            estimator,
+            ao: scene.ao,
+            rays,
+            seed: args.method.seed,
+            replicate,
+        };
         loaded.render(&job).map_err(fail)
     };
     (0..args.replicates).map(frame).collect()

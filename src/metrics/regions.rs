@@ -88,6 +88,12 @@ impl Regions {
         Regions { pixels }
     }
 
+    /// The same regions without the pixels that `keep` refuses.
+    #[must_use]
+    pub fn only(&self, keep: impl Fn(u32) -> bool) -> Regions {
+        Regions { pixels: self.pixels.each_ref().map(|p| p.iter().copied().filter(|&i| keep(i)).collect()) }
+    }
+
     /// The pixels of a region, in order.
     pub fn pixels(&self, region: Region) -> &[u32] {
         &self.pixels[region as usize]

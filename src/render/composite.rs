@@ -202,7 +202,15 @@ pub fn compose(
             let openness = match *estimator {
                 None => None,
                 Some(estimator) => {
-                    let job = Job { view: &view, estimator, ao: what.ao, rays, seed: what.seed, replicate: sample };
+                    let job = Job {
+                        view: &view,
+                        camera: None,
+                        estimator,
+                        ao: what.ao,
+                        rays,
+                        seed: what.seed,
+                        replicate: sample,
+                    };
                     Some(loaded.render(&job)?)
                 }
             };

@@ -1,7 +1,10 @@
 //! What is estimated: openness in its variants, local indirect light, or the
 //! whole of light transport.
 
-use super::smoothing::Smoothing;
+use super::{
+    screen_space::{Integral, ScreenSpace},
+    smoothing::Smoothing,
+};
 use aogauge_scenes::AoScale;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,6 +17,8 @@ pub enum Estimator {
     /// Openness plus the light of nearby occluders, by luminance, for an ambient
     /// radiance of 1 (the paper's Eq. 3 and 4): O + I.
     LocalIndirect(LocalIndirect),
+    /// `hbao`, `gtao`: openness from a camera's depth and normals.
+    ScreenSpace(ScreenSpace),
     /// Irradiance over pi from the scene's light with diffuse interreflection:
     /// unbiased, and without R.
     PathTraced,
@@ -33,6 +38,10 @@ pub enum Kind {
     ExtendedObscurance,
     /// Openness plus the light that nearby occluders send back.
     LocalIndirect,
+    /// Horizon-based, from depth and normals: uniform in solid angle.
+    Hbao,
+    /// Horizon-based, from depth and normals: cosine-weighted.
+    Gtao,
     /// The whole of light transport.
     PathTraced,
 }
@@ -105,6 +114,8 @@ pub enum Falloff {
         /// That part, in (0, 1]; XeGTAO's is 0.615.
         tail: f32,
     },
+    /// (d/R)^2 up to R (HBAO).
+    Quadratic,
     /// A = 1 - (1 - floor) exp(-lambda (d/R)^2) up to R, then brightened for
     /// interreflection to A / (1 - rho (1 - A)) (Microsoft's sample).
     Gaussian {
@@ -132,6 +143,7 @@ impl Falloff {
         match self {
             Falloff::Step => 0.0,
             Falloff::Exponential { extinction } => -(-extinction * d).exp_m1(),
+            Falloff::Quadratic => (d / radius) * (d / radius),
             Falloff::LinearTail { tail } => (1.0 - (1.0 - d / radius) / tail).clamp(0.0, 1.0),
             Falloff::Gaussian { lambda, floor, reflectance } => {
                 let x = d / radius;
@@ -278,6 +290,10 @@ impl Estimator {
                 (_, Some(_)) => Kind::ExtendedObscurance,
             },
             Estimator::LocalIndirect(_) => Kind::LocalIndirect,
+            Estimator::ScreenSpace(s) => match s.integral {
+                Integral::Hbao { .. } => Kind::Hbao,
+                Integral::Gtao { .. } => Kind::Gtao,
+            },
             Estimator::PathTraced => Kind::PathTraced,
         }
     }
@@ -308,6 +324,7 @@ mod tests {
         for (falloff, d, expected) in [
             (Falloff::Step, 0.499, 0.0),
             (Falloff::Exponential { extinction: 2.0 }, 0.5, 1.0 - (-1.0f32).exp()),
+            (Falloff::Quadratic, 0.25, 0.25),
             (Falloff::LinearTail { tail: 0.615 }, 0.0, 0.0),
             (Falloff::LinearTail { tail: 0.615 }, 0.5 * (1.0 - 0.615), 0.0),
             (Falloff::LinearTail { tail: 0.615 }, 0.5 * (1.0 - 0.3075), 0.5),

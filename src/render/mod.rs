@@ -13,11 +13,14 @@ pub mod lights;
 pub mod materials;
 pub mod path;
 pub mod sampler;
+pub mod screen_space;
 pub mod smoothing;
 
 pub use estimator::{
     Estimator, Extension, Faces, Falloff, Kind, LocalIndirect, Openness, ReceiverPlane, Scale, SecondaryOrigin, Sides,
 };
+
+pub use screen_space::ScreenSpace;
 
 use crate::trace::Tracer;
 use aogauge_scenes::{AoScale, Environment, Object, Scene, View};
@@ -30,7 +33,8 @@ pub struct Frame {
     /// Width and height in pixels.
     pub resolution: [u32; 2],
     /// What the estimator computes, openness in [0, 1] or light by luminance; NaN
-    /// where the view meets no surface.
+    /// where the view meets no surface. Few slices of `gtao` may read above 1, and
+    /// few directions of `hbao` below 0: only their mean has bounds.
     pub values: Vec<f32>,
     /// The same by linear red, green and blue, for estimators that know colour.
     pub colors: Option<Vec<[f32; 3]>>,
@@ -51,11 +55,15 @@ pub struct Frame {
 pub struct Job<'a> {
     /// From where.
     pub view: &'a View,
+    /// The camera whose depth and normals a method of screen space takes, where
+    /// that is not the view itself; others ignore it. What it does not show is
+    /// NaN.
+    pub camera: Option<&'a View>,
     /// What.
     pub estimator: Estimator,
     /// R and R'.
     pub ao: AoScale,
-    /// N, primary rays a pixel.
+    /// N, primary rays a pixel; slices or directions in screen space.
     pub rays: u32,
     /// The run's seed.
     pub seed: u32,
@@ -109,6 +117,7 @@ impl Geometry {
         match estimator {
             Estimator::Openness(o) => check_rounding(&self.tracer, o.scale.on(ao).radius),
             Estimator::LocalIndirect(l) => check_rounding(&self.tracer, l.scale.on(ao).radius),
+            Estimator::ScreenSpace(s) => check_rounding(&self.tracer, s.radius(ao)),
             Estimator::PathTraced => Ok(()),
         }
     }
@@ -177,11 +186,11 @@ pub enum RenderError {
         /// What may be asked for.
         knows: &'static str,
     },
-    /// Smoothing needs to know where points appear.
+    /// Screen space and smoothing need to know where points appear.
     #[error(
-        "temporal and denoise need a view that is orthographic or perspective and has an extent; this one is neither"
+        "screen-space methods, temporal and denoise need a view that is perspective or orthographic, and has an extent"
     )]
-    NoCamera,
+    Camera,
     /// A GPU was asked for by name and there is none.
     #[error("no GPU adapter was found: {0}")]
     NoAdapter(String),

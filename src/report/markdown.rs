@@ -4,10 +4,11 @@ use super::table::{self, Row, outcome_text, plus_minus, subject, value_text};
 use crate::{
     gate::{CONFIDENCE, Outcome},
     metrics::{Metric, MetricName, artifact::Brighter, regions::Region},
-    record::{CaseRecord, Record, SceneRecord, Stopped},
+    record::{CaseRecord, Record, SceneRecord, ScreenRecord, Stopped},
 };
 use minijinja::{Environment, syntax::SyntaxConfig, value::Serde};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// The folder of the report's pictures, beside it.
 pub const PICTURES: &str = "pictures";
@@ -47,6 +48,8 @@ struct SceneSection {
     secondary_radius: f64,
     judge: Option<String>,
     no_judge: Option<String>,
+    /// Where screen-space methods are computed, and what is seen from there.
+    screen: Option<String>,
     estimators: Vec<String>,
     cases: Vec<CaseRow>,
     regions: String,
@@ -150,6 +153,20 @@ fn judge_text(scene: &SceneRecord) -> Option<String> {
     ))
 }
 
+fn screen_text(scene: &SceneRecord, screen: &ScreenRecord) -> String {
+    let [x, y, z] = screen.eye;
+    let [width, height] = screen.resolution;
+    let shown = [Region::Footprint, Region::Left, Region::Right, Region::All].map(|r| {
+        let of = |regions: &BTreeMap<Region, usize>| regions.get(&r).copied().unwrap_or_default();
+        format!("{} {} of {}", r.label(), of(&screen.regions), of(&scene.regions))
+    });
+    format!(
+        "Screen-space methods are computed in the {width} x {height} pixels of a camera at ({x:.2}, {y:.2}, {z:.2}) m from \
+         the centre of the measure view, and measured, with Q and classic AO beside them, on the measured points that it shows: {}.",
+        shown.join(", ")
+    )
+}
+
 fn section(record: &Record, scene: &SceneRecord) -> SceneSection {
     let cases: Vec<&CaseRecord> = record.cases.iter().filter(|c| c.case.scene == scene.name).collect();
     SceneSection {
@@ -161,6 +178,7 @@ fn section(record: &Record, scene: &SceneRecord) -> SceneSection {
         secondary_radius: scene.secondary_radius,
         judge: judge_text(scene),
         no_judge: scene.no_judge.clone(),
+        screen: scene.screen.as_ref().map(|s| screen_text(scene, s)),
         estimators: record.suite.estimators.clone(),
         cases: cases.iter().filter(|c| c.error.is_none()).map(|c| case_row(record, c, scene.judge.is_some())).collect(),
         regions: scene.regions.iter().map(|(r, n)| format!("{} {n}", r.label())).collect::<Vec<_>>().join(", "),

@@ -24,6 +24,9 @@ pub(super) struct Judged {
     pub judge: Judge,
     /// Why metrics must not use it.
     pub usable: Result<(), Absent>,
+    /// The same over the pixels that screen-space methods are measured on; absent
+    /// where metrics must not use it, and in suites without such methods.
+    pub on_screen: Result<Judge, Absent>,
     pub record: JudgeRecord,
     pub curve: profile::Curve,
 }
@@ -51,7 +54,7 @@ impl Set<'_> {
         }
         let precision = judge.widest();
         let sure = precision <= settings.precision;
-        let vague = || {
+        let vague = |precision: f64| {
             Absent(format!(
                 "the judge is less precise than asked: {:.2} % of a region mean after {} replicates, {:.2} % wanted",
                 precision * 100.0,
@@ -59,7 +62,7 @@ impl Set<'_> {
                 settings.precision * 100.0
             ))
         };
-        let contrast = if sure { Ok(judge.contrast()) } else { Err(vague()) };
+        let contrast = if sure { Ok(judge.contrast()) } else { Err(vague(precision)) };
         let record = JudgeRecord {
             contrast: Metric::new(MetricName::JudgeContrast, None, contrast),
             q: Judge::REGIONS.into_iter().filter_map(|r| Some((r, region_q(judge.q_of(r)?)))).collect(),
@@ -72,7 +75,15 @@ impl Set<'_> {
         };
         let curve = profile::of_judge(&pairs, self.view.resolution[0] as usize);
         timing.judges.insert(self.scene.name.clone(), start.elapsed().as_secs_f64());
-        Ok(Ok(Judged { usable: if sure { Ok(()) } else { Err(vague()) }, judge, record, curve }))
+        let on_screen = match &self.on_screen {
+            None => Err(Absent("the suite has no screen-space method".into())),
+            Some(s) => Judge::new(&pairs, &s.regions).and_then(|j| match j.widest() {
+                precision if precision <= settings.precision => Ok(j),
+                precision => Err(vague(precision)),
+            }),
+        };
+        let usable = if sure { Ok(()) } else { Err(vague(precision)) };
+        Ok(Ok(Judged { usable, on_screen, judge, record, curve }))
     }
 
     /// Traces the scene and its twin, adding replicates until every region mean

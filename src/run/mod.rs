@@ -2,6 +2,7 @@
 
 mod case_metrics;
 mod judging;
+mod on_screen;
 mod set;
 
 use crate::{

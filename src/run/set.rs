@@ -4,6 +4,7 @@ use super::{
     MAX_GIB, Progress, RunError,
     case_metrics::{Others, metrics},
     judging::Judged,
+    on_screen::{OnScreen, is_on_screen},
 };
 use crate::{
     judge_cache::JudgeCache,
@@ -48,6 +49,8 @@ pub(super) struct Set<'a> {
     pub(super) view: View,
     pub(super) gbuffer: GBuffer,
     pub(super) regions: Regions,
+    /// For suites with methods of screen space.
+    pub(super) on_screen: Option<OnScreen>,
 }
 
 /// The images of one case.
@@ -95,7 +98,8 @@ impl<'a> Set<'a> {
             twin = Some(bare);
         }
         let hash = given.hash();
-        Ok(Set { plan, scene, hash, geometry, twin, view, gbuffer, regions })
+        let on_screen = OnScreen::new(plan, &scene, &geometry.tracer, &gbuffer, &regions)?;
+        Ok(Set { plan, scene, hash, geometry, twin, view, gbuffer, regions, on_screen })
     }
 
     pub(super) fn run(
@@ -119,6 +123,7 @@ impl<'a> Set<'a> {
             let replicates = (0..CONVERGED_REPLICATES).map(|replicate| {
                 let job = Job {
                     view: &self.view,
+                    camera: self.camera(),
                     estimator: method.estimator.unsmoothed(),
                     ao: self.scene.ao,
                     rays: self.plan.suite.file.converged_rays.get() / CONVERGED_REPLICATES,
@@ -168,6 +173,7 @@ impl<'a> Set<'a> {
         for replicate in 0..self.plan.suite.file.replicates.get() {
             let Frame { values, seconds, .. } = loaded.render(&Job {
                 view: &self.view,
+                camera: self.camera(),
                 estimator: self.plan.suite.methods[self.method(case)].estimator,
                 ao: self.scene.ao,
                 rays: case.rays,
@@ -180,8 +186,24 @@ impl<'a> Set<'a> {
         Ok(images)
     }
 
-    fn measured<'b>(&'b self, own: &'b Images, converged: &'b Converged) -> Measured<'b> {
-        Measured { replicates: &own.replicates, converged, regions: &self.regions }
+    /// Where methods of screen space are computed.
+    fn camera(&self) -> Option<&View> {
+        self.on_screen.as_ref().map(|s| &s.camera)
+    }
+
+    /// Where a method is measured, and what is measured beside it.
+    fn regions(&self, method: usize) -> &Regions {
+        let shown = self.on_screen.as_ref().filter(|_| is_on_screen(&self.plan.suite.methods[method]));
+        shown.map_or(&self.regions, |s| &s.regions)
+    }
+
+    /// The judge of the pixels that a method is measured on.
+    fn judge_of<'b>(&self, method: usize, judged: &'b Result<Judged, Absent>) -> Result<&'b Judge, Absent> {
+        let judged = judged.as_ref().map_err(Clone::clone)?;
+        if is_on_screen(&self.plan.suite.methods[method]) {
+            return judged.on_screen.as_ref().map_err(Clone::clone);
+        }
+        judged.usable.clone().map(|()| &judged.judge)
     }
 
     fn case_records(
@@ -203,15 +225,18 @@ impl<'a> Set<'a> {
                     continue;
                 }
             };
-            let method = self.measured(own, &converged[self.method(case)]);
+            let index = self.method(case);
+            let regions = self.regions(index);
+            let method = measured(own, &converged[index], regions);
             let on_classic = self.classic_beside(case, classic);
-            let classic_method = of(&on_classic).map(|own| self.measured(own, &converged[self.method(&on_classic)]));
+            let classic_method =
+                of(&on_classic).map(|own| measured(own, &converged[self.method(&on_classic)], regions));
             let on_cpu = Case { renderer: "cpu".into(), ..case.clone() };
             let cpu = of(&on_cpu).filter(|_| case.renderer != "cpu").map(|i| i.replicates.as_slice());
             let others = Others {
                 classic: classic_method.filter(|_| case.estimator != *classic),
                 cpu,
-                judge: judged.as_ref().map_err(Clone::clone).and_then(|j| j.usable.clone().map(|()| &j.judge)),
+                judge: self.judge_of(index, judged),
                 occluder: self.scene.has_occluder(),
             };
             let (image, hash) = self.write_case(folder, case, &own.replicates)?;
@@ -268,7 +293,15 @@ impl<'a> Set<'a> {
         let seed = self.plan.seed.wrapping_add(LOOK);
         let mut layers = Layers::new(view.resolution);
         for method in &self.plan.suite.methods {
-            let job = Job { view: &view, estimator: method.estimator, ao: self.scene.ao, rays, seed, replicate: 0 };
+            let job = Job {
+                view: &view,
+                camera: None,
+                estimator: method.estimator,
+                ao: self.scene.ao,
+                rays,
+                seed,
+                replicate: 0,
+            };
             let frame = cpu.render(&job).map_err(render_error(&self.scene))?;
             layers = layers.with(&format!("openness-{}", method.name), frame.values);
         }
@@ -296,8 +329,8 @@ impl<'a> Set<'a> {
             layers = layers.with(&format!("region-{}", region.label()), self.regions.mask(region, pixels));
         }
         let mut brighter = BTreeMap::new();
-        for (method, converged) in methods.iter().zip(converged) {
-            let measured = Measured { replicates: &[], converged, regions: &self.regions };
+        for (index, (method, converged)) in methods.iter().zip(converged).enumerate() {
+            let measured = Measured { replicates: &[], converged, regions: self.regions(index) };
             if let Ok(side) = measured.brighter() {
                 brighter.insert(method.name.clone(), side);
             }
@@ -338,6 +371,7 @@ impl<'a> Set<'a> {
             regions: Region::ALL.into_iter().map(|r| (r, self.regions.pixels(r).len())).collect(),
             brighter,
             judge,
+            screen: self.on_screen.as_ref().map(|s| s.record.clone()),
             no_judge,
             profiles,
             image,
@@ -346,13 +380,17 @@ impl<'a> Set<'a> {
     }
 }
 
+fn measured<'a>(own: &'a Images, converged: &'a Converged, regions: &'a Regions) -> Measured<'a> {
+    Measured { replicates: &own.replicates, converged, regions }
+}
+
 /// A flank that reaches the view's first or last column, and may go on beyond.
 fn cut_flank(regions: &Regions, width: u32) -> Option<Region> {
     let outer = |i: &u32| [0, width - 1].contains(&(i % width));
     [Region::Left, Region::Right].into_iter().find(|&flank| regions.pixels(flank).iter().any(outer))
 }
 
-fn render_error(scene: &Scene) -> impl Fn(RenderError) -> RunError + use<> {
+pub(super) fn render_error(scene: &Scene) -> impl Fn(RenderError) -> RunError + use<> {
     let scene = scene.name.clone();
     move |source| RunError::Render { scene: scene.clone(), source }
 }

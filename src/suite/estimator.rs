@@ -1,6 +1,7 @@
 //! `[[estimator]]`: a method with its options, or a preset.
 
 use super::Rays;
+use crate::render::screen_space::{Integral, ScreenSpace};
 use crate::render::{
     Estimator, Extension, Faces, Falloff, Kind, LocalIndirect, Openness, ReceiverPlane, Scale, SecondaryOrigin, Sides,
     smoothing::{Denoise, Smoothing, Temporal},
@@ -21,14 +22,17 @@ pub struct EstimatorFile {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kind: Option<Kind>,
     /// Methods as engines and the paper set them: `unity-low`, `unity-medium`,
-    /// `unity-high`, `unreal-default`, `microsoft-sample`, `paper-4`, `paper-32`.
+    /// `unity-high`, `unreal-default`, `microsoft-sample`, `paper-4`, `paper-32`,
+    /// `xegtao-high`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub preset: Option<String>,
-    /// Primary rays a pixel, in place of the suite's.
+    /// Primary rays a pixel, in place of the suite's; slices of `gtao`, directions
+    /// of `hbao`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rays: Option<Rays>,
     /// How much an occluder at a distance closes a ray, for `obscurance`,
-    /// `extended-obscurance` and `local-indirect`.
+    /// `extended-obscurance`, `local-indirect`, `hbao` (`quadratic` unless given) and
+    /// `gtao` (`step` unless given).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub falloff: Option<Falloff>,
     /// Which side of a triangle closes a ray; both unless given.
@@ -64,6 +68,26 @@ pub struct EstimatorFile {
     /// For openness: the spatial filter, before `intensity`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub denoise: Option<Denoise>,
+    /// For `hbao` and `gtao`: depth samples along a direction, 1 to 64; 8 unless
+    /// given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub steps: Option<u32>,
+    /// For `hbao` and `gtao`: samples lie at equal parts of R to this power, 1 to
+    /// 4; 1 unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sample_power: Option<u32>,
+    /// For `hbao` and `gtao`: R is taken this many times, above 0, at most 16; 1
+    /// unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius_multiplier: Option<f32>,
+    /// For `hbao`: horizons up to this angle over the tangent plane count for
+    /// nothing; degrees, 0 to below 90, 10 unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tangent_bias: Option<f32>,
+    /// For `gtao` with falloff `step`: what the image shows is this thick along
+    /// the line of sight, metres; endless unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thickness: Option<f32>,
 }
 
 /// The paper's number.
@@ -103,6 +127,7 @@ impl EstimatorFile {
                 (o.falloff, o.scale)
             }
             Estimator::LocalIndirect(l) => (l.falloff, l.scale),
+            Estimator::ScreenSpace(s) => return file.with_screen_space(s),
             Estimator::PathTraced => return file,
         };
         file.falloff = Some(falloff).filter(|f| *f != Falloff::Step);
@@ -140,18 +165,24 @@ impl EstimatorFile {
             secondary_origin: self.secondary_origin.or(base.secondary_origin),
             temporal: self.temporal.or(base.temporal),
             denoise: self.denoise.or(base.denoise),
+            steps: self.steps.or(base.steps),
+            sample_power: self.sample_power.or(base.sample_power),
+            radius_multiplier: self.radius_multiplier.or(base.radius_multiplier),
+            tangent_bias: self.tangent_bias.or(base.tangent_bias),
+            thickness: self.thickness.or(base.thickness),
         })
     }
 
     fn estimator(&self) -> Result<Estimator, String> {
         let kind = self.kind.ok_or("give kind or preset")?;
-        let openness = !matches!(kind, Kind::LocalIndirect | Kind::PathTraced);
+        let screen = matches!(kind, Kind::Hbao | Kind::Gtao);
+        let openness = !screen && !matches!(kind, Kind::LocalIndirect | Kind::PathTraced);
         let extended = matches!(kind, Kind::Extended | Kind::ExtendedObscurance);
         let falls = matches!(kind, Kind::Obscurance | Kind::ExtendedObscurance | Kind::LocalIndirect);
         for (field, given, allowed) in [
-            ("falloff", self.falloff.is_some(), falls),
+            ("falloff", self.falloff.is_some(), falls || screen),
             ("faces", self.faces.is_some(), openness),
-            ("intensity", self.intensity.is_some(), openness),
+            ("intensity", self.intensity.is_some(), openness || screen),
             ("radius", self.radius.is_some(), kind != Kind::PathTraced),
             ("secondary_radius", self.secondary_radius.is_some(), extended),
             ("receiver_plane", self.receiver_plane.is_some(), extended),
@@ -160,6 +191,11 @@ impl EstimatorFile {
             ("secondary_origin", self.secondary_origin.is_some(), extended),
             ("temporal", self.temporal.is_some(), openness),
             ("denoise", self.denoise.is_some(), openness),
+            ("steps", self.steps.is_some(), screen),
+            ("sample_power", self.sample_power.is_some(), screen),
+            ("radius_multiplier", self.radius_multiplier.is_some(), screen),
+            ("tangent_bias", self.tangent_bias.is_some(), kind == Kind::Hbao),
+            ("thickness", self.thickness.is_some(), kind == Kind::Gtao),
         ] {
             if given && !allowed {
                 return Err(format!("{field} means nothing for kind '{kind}'"));
@@ -177,14 +213,15 @@ impl EstimatorFile {
             (Some(falloff), _) => legal(falloff)?,
             (None, Kind::Obscurance | Kind::ExtendedObscurance) => {
                 return Err(format!(
-                    "kind '{kind}' needs falloff: {{ exponential = {{ extinction }} }}, {{ linear-tail = {{ tail }} }} \
-                     or {{ gaussian = {{ lambda, floor, reflectance }} }}"
+                    "kind '{kind}' needs falloff: {{ exponential = {{ extinction }} }}, {{ linear-tail = {{ tail }} }}, \
+                     'quadratic' or {{ gaussian = {{ lambda, floor, reflectance }} }}"
                 ));
             }
             (None, _) => Falloff::Step,
         };
         Ok(match kind {
             Kind::PathTraced => Estimator::PathTraced,
+            Kind::Hbao | Kind::Gtao => Estimator::ScreenSpace(self.screen_space(kind)?),
             Kind::LocalIndirect => Estimator::LocalIndirect(LocalIndirect { falloff, scale }),
             _ => Estimator::Openness(Openness {
                 falloff,
@@ -195,6 +232,65 @@ impl EstimatorFile {
                 smoothing,
             }),
         })
+    }
+
+    fn screen_space(&self, kind: Kind) -> Result<ScreenSpace, String> {
+        let mut method = if kind == Kind::Gtao { ScreenSpace::GTAO } else { ScreenSpace::HBAO };
+        method.radius = self.radius;
+        method.falloff = self.falloff.unwrap_or(method.falloff);
+        if !matches!(method.falloff, Falloff::Step | Falloff::Quadratic | Falloff::LinearTail { .. }) {
+            return Err(format!("kind '{kind}' takes falloff 'step', 'quadratic' or {{ linear-tail = {{ tail }} }}"));
+        }
+        for (field, given, most, value) in [
+            ("steps", self.steps, ScreenSpace::MOST_STEPS, &mut method.steps),
+            ("sample_power", self.sample_power, 4, &mut method.sample_power),
+        ] {
+            *value = given.unwrap_or(*value);
+            if !(1..=most).contains(value) {
+                return Err(format!("{field} is {value}: it must be from 1 to {most}"));
+            }
+        }
+        for (field, given, value) in [
+            ("radius_multiplier", self.radius_multiplier, &mut method.radius_multiplier),
+            ("intensity", self.intensity, &mut method.intensity),
+        ] {
+            *value = between(field, given, 0.0, 16.0, "")?.unwrap_or(*value);
+        }
+        match &mut method.integral {
+            Integral::Hbao { tangent_bias } => {
+                *tangent_bias = self.tangent_bias.unwrap_or(*tangent_bias);
+                if !(0.0..90.0).contains(tangent_bias) {
+                    return Err(format!("tangent_bias is {tangent_bias} degrees: it must be at least 0 and below 90"));
+                }
+            }
+            Integral::Gtao { thickness } => {
+                *thickness = between("thickness", self.thickness, 0.0, 1e6, " m")?;
+                if thickness.is_some() && method.falloff != Falloff::Step {
+                    return Err("thickness goes with falloff 'step' alone: a sector is open or closed".into());
+                }
+            }
+        }
+        Ok(method)
+    }
+
+    /// With the options of a method in screen space that are not as they would be
+    /// anyway.
+    fn with_screen_space(self, s: &ScreenSpace) -> EstimatorFile {
+        let (usual, tangent_bias, thickness) = match s.integral {
+            Integral::Gtao { thickness } => (ScreenSpace::GTAO, None, thickness),
+            Integral::Hbao { tangent_bias } => (ScreenSpace::HBAO, Some(tangent_bias), None),
+        };
+        EstimatorFile {
+            falloff: Some(s.falloff).filter(|f| *f != usual.falloff),
+            intensity: Some(s.intensity).filter(|i| *i != usual.intensity),
+            radius: s.radius,
+            steps: Some(s.steps).filter(|n| *n != usual.steps),
+            sample_power: Some(s.sample_power).filter(|p| *p != usual.sample_power),
+            radius_multiplier: Some(s.radius_multiplier).filter(|m| *m != usual.radius_multiplier),
+            tangent_bias: tangent_bias.filter(|_| s.integral != usual.integral),
+            thickness,
+            ..self
+        }
     }
 
     fn extension(&self, kind: Kind) -> Result<Extension, String> {
@@ -220,7 +316,7 @@ fn of_step(kind: Kind) -> Kind {
 
 fn legal(falloff: Falloff) -> Result<Falloff, String> {
     match falloff {
-        Falloff::Step => {}
+        Falloff::Step | Falloff::Quadratic => {}
         Falloff::Exponential { extinction } => {
             between("falloff.exponential.extinction", Some(extinction), 0.0, 1e6, " 1/m")?;
         }
@@ -262,7 +358,16 @@ mod tests {
         let names: Vec<String> = presets().unwrap().into_keys().collect();
         assert_eq!(
             names,
-            ["microsoft-sample", "paper-32", "paper-4", "unity-high", "unity-low", "unity-medium", "unreal-default"]
+            [
+                "microsoft-sample",
+                "paper-32",
+                "paper-4",
+                "unity-high",
+                "unity-low",
+                "unity-medium",
+                "unreal-default",
+                "xegtao-high"
+            ]
         );
         for name in &names {
             build(&format!("preset = '{name}'")).unwrap();
@@ -294,6 +399,11 @@ mod tests {
              denoise = { passes = 2, normal = 0.2, plane = 3.0, openness = 1.0 }",
             "kind = 'local-indirect'\nfalloff = { exponential = { extinction = 4.0 } }",
             "kind = 'path-traced'",
+            "kind = 'hbao'",
+            "kind = 'gtao'\nthickness = 0.02",
+            "kind = 'hbao'\ntangent_bias = 30.0\nfalloff = 'step'\nsteps = 4",
+            "kind = 'gtao'\nradius_multiplier = 1.457\nfalloff = { linear-tail = { tail = 0.615 } }\nsample_power = 2\n\
+             intensity = 2.2\nradius = 0.5\nsteps = 3",
         ] {
             let (estimator, _) = build(text).unwrap();
             let file = EstimatorFile::of(&estimator);
@@ -332,6 +442,18 @@ mod tests {
             ("kind = 'classic'\ndenoise = { openness = -1 }", "denoise.openness is -1"),
             ("kind = 'path-traced'\ndenoise = {}", "denoise means nothing for kind 'path-traced'"),
             ("kind = 'local-indirect'\ntemporal = {}", "temporal means nothing for kind 'local-indirect'"),
+            ("kind = 'gtao'\nfaces = 'front'", "faces means nothing for kind 'gtao'"),
+            ("kind = 'gtao'\ntangent_bias = 10", "tangent_bias means nothing for kind 'gtao'"),
+            ("kind = 'hbao'\ntangent_bias = 90", "tangent_bias is 90 degrees"),
+            ("kind = 'hbao'\nthickness = 1", "thickness means nothing for kind 'hbao'"),
+            ("kind = 'gtao'\nthickness = 0", "thickness is 0 m"),
+            ("kind = 'gtao'\nthickness = 1\nfalloff = 'quadratic'", "falloff 'step' alone"),
+            ("kind = 'hbao'\nsteps = 65", "steps is 65: it must be from 1 to 64"),
+            ("kind = 'hbao'\nsample_power = 0", "sample_power is 0"),
+            ("kind = 'hbao'\nradius_multiplier = 0", "radius_multiplier is 0"),
+            ("kind = 'hbao'\nreceiver_plane = 'counts'", "receiver_plane means nothing for kind 'hbao'"),
+            ("kind = 'gtao'\nfalloff = { exponential = { extinction = 4.0 } }", "kind 'gtao' takes falloff 'step'"),
+            ("kind = 'classic'\nsteps = 4", "steps means nothing for kind 'classic'"),
             ("kind = 'clasic'", "classic"),
             ("kind = 'classic'\ncolour = 1", "colour"),
         ] {

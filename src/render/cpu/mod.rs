@@ -8,6 +8,7 @@ use super::{
     gbuffer::{GBuffer, Surface},
     indirect, path,
     sampler::Sampler,
+    screen_space::Screen,
     smoothing::Smoothing,
 };
 use crate::trace::Tracer;
@@ -24,11 +25,13 @@ struct LoadedCpu<'a> {
     geometry: &'a Geometry,
     /// The view rendered last, with what it sees: replicates share it.
     seen: Option<(View, GBuffer)>,
+    /// The same for screen space.
+    screen: Option<Screen>,
 }
 
 impl Renderer for Cpu {
     fn load<'a>(&'a self, geometry: &'a Geometry) -> Result<Box<dyn Loaded + 'a>, RenderError> {
-        Ok(Box::new(LoadedCpu { geometry, seen: None }))
+        Ok(Box::new(LoadedCpu { geometry, seen: None, screen: None }))
     }
 }
 
@@ -45,6 +48,10 @@ impl Loaded for LoadedCpu<'_> {
         {
             return smoothed::smoothed(tracer, gbuffer, job, method);
         }
+        let screen = match &job.estimator {
+            Estimator::ScreenSpace(_) => Some(Screen::again(&mut self.screen, tracer, gbuffer, job)?),
+            _ => None,
+        };
         let start = Instant::now();
         let image = match &job.estimator {
             Estimator::Openness(method) => openness(tracer, gbuffer, job, *method),
@@ -52,6 +59,7 @@ impl Loaded for LoadedCpu<'_> {
                 let sampler = Sampler::new(job.seed, pixel, job.replicate);
                 indirect::incident(self.geometry, surface, job.ao, method, job.rays, &sampler)
             })),
+            Estimator::ScreenSpace(method) => Image::plain(screen.map_or_else(Vec::new, |s| s.openness(job, method))),
             Estimator::PathTraced => {
                 Image::colored(path::colors(self.geometry, gbuffer, job.rays, job.seed, job.replicate))
             }
@@ -75,6 +83,10 @@ struct Image {
 }
 
 impl Image {
+    fn plain(values: Vec<f32>) -> Self {
+        Image { values, colors: None, decisions: None }
+    }
+
     fn colored(colors: Vec<[f32; 3]>) -> Self {
         Image { values: colors.iter().map(|&c| luminance(c)).collect(), colors: Some(colors), decisions: None }
     }

@@ -244,7 +244,8 @@ impl Lit<'_> {
             let (_, buffer, bound) = &image;
             // Of the job only the view is asked for; its rays are the lights.
             let ao = AoScale { radius: 1.0, secondary_radius: 1.0 };
-            let job = Job { view, estimator: Estimator::CLASSIC, ao, rays: self.lights, seed: 0, replicate: 0 };
+            let job =
+                Job { view, camera: None, estimator: Estimator::CLASSIC, ao, rays: self.lights, seed: 0, replicate: 0 };
             let pieces = pieces(places(view.resolution), self.lights, LIGHTS_AN_INVOCATION, self.scene.budget());
             self.scene.dispatch(&job, &Program::new(&job.estimator)?, bound, pieces, None);
             device.read(buffer)

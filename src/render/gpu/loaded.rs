@@ -8,9 +8,10 @@ use super::{
     params::{Params, Program, Stage, places},
     query,
     raster::Raster,
+    screen_space::OnScreen,
 };
 use crate::{
-    render::{Frame, Geometry, Job, Loaded, RenderError, ao::Decisions, smoothing::Smoothing},
+    render::{Estimator, Frame, Geometry, Job, Loaded, RenderError, ao::Decisions, smoothing::Smoothing},
     trace::{WIDE_STACK, Wide},
 };
 use aogauge_scenes::luminance;
@@ -31,11 +32,11 @@ pub(super) const STOPPED: f32 = -1.0;
 /// `Surface` of surface.wgsl.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct Surface {
-    point: [f32; 3],
-    triangle: u32,
-    normal: [f32; 3],
-    unused: u32,
+pub(super) struct Surface {
+    pub point: [f32; 3],
+    pub triangle: u32,
+    pub normal: [f32; 3],
+    pub unused: u32,
 }
 
 /// Buffers that depend on the number of pixels.
@@ -87,6 +88,7 @@ pub(super) struct LoadedGpu<'a> {
     materials: Option<wgpu::Buffer>,
     params: wgpu::Buffer,
     images: Option<Images>,
+    screen: Option<OnScreen>,
 }
 
 impl<'a> LoadedGpu<'a> {
@@ -119,6 +121,7 @@ impl<'a> LoadedGpu<'a> {
                 materials: None,
                 params: device.uniform("params", &Params::zeroed())?,
                 images: None,
+                screen: None,
             })
         })
     }
@@ -298,8 +301,13 @@ impl<'a> LoadedGpu<'a> {
 
 impl Loaded for LoadedGpu<'_> {
     fn render(&mut self, job: &Job<'_>) -> Result<Frame, RenderError> {
-        let program = Program::new(&job.estimator)?;
         self.geometry.suits(&job.estimator, job.ao)?;
+        if let Estimator::ScreenSpace(method) = &job.estimator {
+            let budget = self.budget();
+            return OnScreen::again(&mut self.screen, self.gpu, &self.geometry.tracer, job)?
+                .render(job, method, budget);
+        }
+        let program = Program::new(&job.estimator)?;
         let mut images = self.take_images(job, &program)?;
         let start = Instant::now();
         let frame = self.gpu.device.guarded(|| {

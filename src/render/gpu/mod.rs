@@ -10,6 +10,7 @@ mod params;
 mod persistent;
 mod query;
 mod raster;
+mod screen_space;
 #[cfg(test)]
 pub(crate) mod tests;
 mod timing;
@@ -46,6 +47,14 @@ const SHADER: &str = concat!(
     include_str!("shaders/surface.wgsl"),
     include_str!("shaders/ao.wgsl"),
     include_str!("shaders/indirect.wgsl")
+);
+
+/// The shader of screen space.
+const SCREEN_SPACE: &str = concat!(
+    include_str!("shaders/sampler.wgsl"),
+    include_str!("shaders/screen_space.wgsl"),
+    include_str!("shaders/hbao.wgsl"),
+    include_str!("shaders/gtao.wgsl")
 );
 
 /// Values of a shader's `override` constants by name. What a whole dispatch shares

@@ -88,7 +88,8 @@ impl Program {
                 let method = Openness { scale: l.scale, ..Openness::plain(l.falloff) };
                 Ok(Program { method, stage: Stage::Indirect })
             }
-            Estimator::PathTraced => {
+            // Screen space has shaders of its own.
+            Estimator::ScreenSpace(_) | Estimator::PathTraced => {
                 Err(RenderError::Unsupported { renderer: "gpu", kind: estimator.kind(), knows: "all others" })
             }
         }
@@ -149,6 +150,7 @@ fn numbers(falloff: Falloff) -> (u32, [f32; 3]) {
     match falloff {
         Falloff::Step => (0, [0.0; 3]),
         Falloff::Exponential { extinction } => (1, [extinction, 0.0, 0.0]),
+        Falloff::Quadratic => (4, [0.0; 3]),
         Falloff::LinearTail { tail } => (2, [tail, 0.0, 0.0]),
         Falloff::Gaussian { lambda, floor, reflectance } => (3, [lambda, floor, reflectance]),
     }

@@ -41,7 +41,7 @@ pub(crate) fn losing(at: impl IntoIterator<Item = u32>) -> Gpu {
 }
 
 fn job<'a>(scene: &Scene, view: &'a View, estimator: Estimator) -> Job<'a> {
-    Job { view, estimator, ao: scene.ao, rays: 4, seed: 1, replicate: 0 }
+    Job { view, camera: None, estimator, ao: scene.ao, rays: 4, seed: 1, replicate: 0 }
 }
 
 #[test]

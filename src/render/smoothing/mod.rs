@@ -79,10 +79,10 @@ impl Camera {
     /// The camera of a view.
     ///
     /// # Errors
-    /// [`RenderError::NoCamera`] for a view that is neither orthographic nor
+    /// [`RenderError::Camera`] for a view that is neither orthographic nor
     /// perspective, or has no extent.
     pub fn new(view: &View) -> Result<Self, RenderError> {
-        let to_image = view.world_to_image().ok_or(RenderError::NoCamera)?;
+        let to_image = view.world_to_image().ok_or(RenderError::Camera)?;
         let [dx, dy] = if to_image.perspective {
             [view.direction_dx, view.direction_dy]
         } else {

@@ -28,7 +28,7 @@ struct Params {
     falloff_numbers: vec3<f32>,
 }
 
-// STEP, EXPONENTIAL, LINEAR_TAIL or GAUSSIAN.
+// STEP, EXPONENTIAL, LINEAR_TAIL, GAUSSIAN or QUADRATIC.
 override FALLOFF: u32 = 0u;
 // FRONT, CLIPPED, ONE_SIDED, JITTERED, TURNED, a bit each.
 override OPTIONS: u32 = 0u;
@@ -39,6 +39,7 @@ const STEP = 0u;
 const EXPONENTIAL = 1u;
 const LINEAR_TAIL = 2u;
 const GAUSSIAN = 3u;
+const QUADRATIC = 4u;
 
 const FRONT = 1u;
 const CLIPPED = 2u;
@@ -131,6 +132,7 @@ fn mu(d: f32) -> f32 {
     let n = params.falloff_numbers;
     switch FALLOFF {
         case EXPONENTIAL: { return 1.0 - exp(-n.x * d); }
+        case QUADRATIC: { return (d / params.radius) * (d / params.radius); }
         case LINEAR_TAIL: { return clamp(1.0 - (1.0 - d / params.radius) / n.x, 0.0, 1.0); }
         case GAUSSIAN: {
             let x = d / params.radius;
