@@ -188,7 +188,7 @@ pub enum RenderError {
     },
     /// Screen space and smoothing need to know where points appear.
     #[error(
-        "screen-space methods, temporal and denoise need a view that is perspective or orthographic, and has an extent"
+        "screen-space methods, temporal and denoise need a view that is orthographic or perspective, and has an extent"
     )]
     Camera,
     /// A GPU was asked for by name and there is none.

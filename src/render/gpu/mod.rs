@@ -52,6 +52,7 @@ const SHADER: &str = concat!(
 /// The shader of screen space.
 const SCREEN_SPACE: &str = concat!(
     include_str!("shaders/sampler.wgsl"),
+    include_str!("shaders/surface.wgsl"),
     include_str!("shaders/screen_space.wgsl"),
     include_str!("shaders/hbao.wgsl"),
     include_str!("shaders/gtao.wgsl")

@@ -117,16 +117,6 @@ fn see(@builtin(global_invocation_id) id: vec3<u32>) {
     begin(pixel, walk(ray, false, false), ray.direction);
 }
 
-fn tangents(n: vec3<f32>) -> array<vec3<f32>, 2> {
-    let s = select(-1.0, 1.0, n.z >= 0.0);
-    let a = -1.0 / (s + n.z);
-    let b = n.x * n.y * a;
-    return array<vec3<f32>, 2>(
-        vec3<f32>(1.0 + s * n.x * n.x * a, s * b, -s * n.x),
-        vec3<f32>(b, s + n.y * n.y * a, -n.y),
-    );
-}
-
 // mu of a hit at distance d.
 fn mu(d: f32) -> f32 {
     let n = params.falloff_numbers;

@@ -30,14 +30,6 @@ struct Params {
     unused: u32,
 }
 
-struct Surface {
-    point: vec3<f32>,
-    // UNSEEN for none.
-    triangle: u32,
-    normal: vec3<f32>,
-    unused: u32,
-}
-
 @group(0) @binding(0) var<uniform> params: Params;
 // What the camera sees.
 @group(0) @binding(1) var<storage, read> surfaces: array<Surface>;
@@ -50,16 +42,6 @@ const QUADRATIC = 1u;
 const LINEAR_TAIL = 2u;
 const FLAT = 1e-3;
 const STOPPED = -1e30;
-
-fn tangents(n: vec3<f32>) -> array<vec3<f32>, 2> {
-    let s = select(-1.0, 1.0, n.z >= 0.0);
-    let a = -1.0 / (s + n.z);
-    let b = n.x * n.y * a;
-    return array<vec3<f32>, 2>(
-        vec3<f32>(1.0 + s * n.x * n.x * a, s * b, -s * n.x),
-        vec3<f32>(b, s + n.y * n.y * a, -n.y),
-    );
-}
 
 struct Point {
     point: vec3<f32>,

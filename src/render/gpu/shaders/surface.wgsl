@@ -7,3 +7,14 @@ struct Surface {
     normal: vec3<f32>,
     unused: u32,
 }
+
+// Twin: `tangents` of render/ao.rs.
+fn tangents(n: vec3<f32>) -> array<vec3<f32>, 2> {
+    let s = select(-1.0, 1.0, n.z >= 0.0);
+    let a = -1.0 / (s + n.z);
+    let b = n.x * n.y * a;
+    return array<vec3<f32>, 2>(
+        vec3<f32>(1.0 + s * n.x * n.x * a, s * b, -s * n.x),
+        vec3<f32>(b, s + n.y * n.y * a, -n.y),
+    );
+}
