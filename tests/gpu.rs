@@ -213,6 +213,22 @@ fn large_views_are_split() {
     assert!(off * 1000 < on_cpu.values.len(), "{off} of {} pixels", on_cpu.values.len());
 }
 
+/// Nothing to see and nothing to meet.
+#[test]
+fn a_scene_without_triangles_is_empty() {
+    let mut scene = library::scene("plane").unwrap();
+    let view = View { resolution: [5, 3], ..scene.look.view() };
+    scene.objects.clear();
+    let geometry = Geometry::new(&scene).unwrap();
+    for checks in [Checks::On, Checks::Off] {
+        let gpu = Gpu::with(Options { checks, ..Options::default() }).unwrap();
+        let job =
+            Job { view: &view, camera: None, estimator: ESTIMATORS[2], ao: scene.ao, rays: 4, seed: 1, replicate: 0 };
+        let frame = gpu.load(&geometry).unwrap().render(&job).unwrap();
+        assert!(frame.values.iter().all(|v| v.is_nan()) && frame.seen.iter().all(|&t| t == u32::MAX));
+    }
+}
+
 /// Shaders run without checks of indices and loops; with them they find the same.
 #[test]
 fn checks_change_nothing() {

@@ -22,8 +22,7 @@ const LEAF: u32 = 3;
 pub const STACK: usize = 24;
 
 /// Cost of one node, and of one triangle, in the same unit; what counts is their
-/// ratio. Visits and tests a ray on the atrium's measure view, classic:
-/// see docs/gpu.md.
+/// ratio, which is the paper's.
 const NODE: f32 = 1.0;
 const TRIANGLE: f32 = 0.3;
 
@@ -93,13 +92,14 @@ impl Wide {
         let nodes = tracer.nodes();
         // 2^-20 of the largest coordinate, four times the binary tree's: see `enter`.
         let pad = tracer.offset() * 0.5;
-        let mut wide = Wide { nodes: vec![], order: vec![], depth: 0 };
+        // There is always a root, if only one without children.
+        let mut wide = Wide { nodes: vec![WideNode::zeroed()], order: vec![], depth: 1 };
         if nodes.is_empty() {
             return wide;
         }
         let mut choices = vec![None; nodes.len()];
         choose(nodes, 0, &mut choices);
-        wide.nodes.push(WideNode::zeroed());
+        wide.depth = 0;
         // Breadth first: nodes near the root, which all rays visit, lie together.
         let mut level = vec![(0usize, 0u32)];
         while !level.is_empty() {

@@ -261,7 +261,7 @@ impl Lit<'_> {
         let gpu = self.scene.gpu;
         gpu.device.guarded(|| {
             let shaded = gpu.device.storage("pixels", pixels as u64 * size_of::<Shaded>() as u64)?;
-            let kernel = gpu.tracing_kernel(SHADER, "shade", vec![])?;
+            let kernel = self.scene.tracing_kernel(SHADER, "shade", vec![])?;
             let own = self.buffers.iter().map(|(binding, buffer)| (*binding, buffer.as_entire_binding()));
             let all: Vec<_> = [self.scene.told()]
                 .into_iter()

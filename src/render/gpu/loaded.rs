@@ -3,7 +3,7 @@
 mod smoothed;
 
 use super::{
-    GBufferBy, Gpu, SHADER,
+    Constants, GBufferBy, Gpu, SHADER,
     device::{Kernel, Timer, WORKGROUP},
     params::{Params, Program, Stage, places},
     query,
@@ -71,7 +71,7 @@ pub(super) struct Bound {
 /// What rays find triangles by.
 enum Tree {
     /// The renderer's own.
-    Nodes(wgpu::Buffer),
+    Nodes { nodes: wgpu::Buffer, levels: usize },
     /// The driver's.
     Query(wgpu::Tlas),
 }
@@ -104,13 +104,16 @@ impl<'a> LoadedGpu<'a> {
             let [a, b, c] = tracer.triangles()[leaf as usize];
             [a.extend(f32::from_bits(number)), b.extend(0.0), c.extend(0.0)]
         };
-        let corners: Vec<[Vec4; 3]> = wide.order.iter().zip(&source).map(with_number).collect();
+        let mut corners: Vec<[Vec4; 3]> = wide.order.iter().zip(&source).map(with_number).collect();
+        // A binding has at least one element.
+        corners.resize(corners.len().max(1), [Vec4::ZERO; 3]);
         device.guarded(|| {
             let triangles = device.upload("triangles", bytemuck::cast_slice(&corners))?;
             let tree = if device.ray_query {
                 Tree::Query(query::build(device, &triangles, corners.len())?)
             } else {
-                Tree::Nodes(device.upload("nodes", bytemuck::cast_slice(&wide.nodes))?)
+                let nodes = device.upload("nodes", bytemuck::cast_slice(&wide.nodes))?;
+                Tree::Nodes { nodes, levels: wide.depth }
             };
             Ok(LoadedGpu {
                 gpu,
@@ -129,10 +132,24 @@ impl<'a> LoadedGpu<'a> {
     /// What rays are traced against, with the bindings that the shaders give it.
     pub fn tracing(&self) -> [(u32, wgpu::BindingResource<'_>); 2] {
         let tree = match &self.tree {
-            Tree::Nodes(nodes) => nodes.as_entire_binding(),
+            Tree::Nodes { nodes, .. } => nodes.as_entire_binding(),
             Tree::Query(tlas) => tlas.as_binding(),
         };
         [(1, tree), (2, self.triangles.as_entire_binding())]
+    }
+
+    /// A kernel that traces rays in this scene. Its stack is as long as the tree
+    /// needs, in steps, so that scenes share kernels.
+    pub fn tracing_kernel(
+        &self,
+        source: &'static str,
+        entry: &'static str,
+        mut constants: Constants,
+    ) -> Result<Arc<Kernel>, RenderError> {
+        if let Tree::Nodes { levels, .. } = self.tree {
+            constants.push(("STACKS", levels.next_multiple_of(8) as u32 * WORKGROUP));
+        }
+        self.gpu.tracing_kernel(source, entry, constants)
     }
 
     /// What [`Self::dispatch`] tells kernels, with its binding.
@@ -181,10 +198,9 @@ impl<'a> LoadedGpu<'a> {
         let sums = buffer("sums", size_of::<f32>() * stage.channels() as usize)?;
         let decisions = buffer("decisions", size_of::<Decisions>())?;
         let (raster, see) = match self.gpu.setup.options.g_buffer {
-            GBufferBy::Rays => (
-                None,
-                self.bound(self.gpu.tracing_kernel(SHADER, "see", vec![])?, &surfaces, &sums, Some((5, &decisions))),
-            ),
+            GBufferBy::Rays => {
+                (None, self.bound(self.tracing_kernel(SHADER, "see", vec![])?, &surfaces, &sums, Some((5, &decisions))))
+            }
             GBufferBy::Raster => {
                 let [_, triangles] = self.tracing();
                 let seen = [(0, &self.params), (3, &surfaces), (4, &sums), (5, &decisions)];
@@ -211,7 +227,7 @@ impl<'a> LoadedGpu<'a> {
             Stage::Openness => ("openness", Some((5, decisions))),
             Stage::Indirect => ("indirect", self.materials.as_ref().map(|m| (6, m))),
         };
-        let kernel = self.gpu.tracing_kernel(SHADER, entry, program.constants())?;
+        let kernel = self.tracing_kernel(SHADER, entry, program.constants())?;
         Ok(self.bound(kernel, surfaces, sums, more))
     }
 

@@ -55,7 +55,7 @@ fn walk(wide: &Wide, tracer: &Tracer, ray: &Ray, any: bool) -> Walked {
     // out as the highest bit: 7.
     let octant = 7 - (u32::from(d.x < 0.0) | u32::from(d.y < 0.0) << 1 | u32::from(d.z < 0.0) << 2);
     let mut stack = Vec::new();
-    let mut group = (0u32, if wide.nodes.is_empty() { 0 } else { 1u32 << 31 });
+    let mut group = (0u32, 1u32 << 31);
     loop {
         if group.1 > 0x00ff_ffff {
             let bit = 31 - group.1.leading_zeros();

@@ -47,10 +47,15 @@ const ONE_SIDED = 4u;
 const JITTERED = 8u;
 const TURNED = 16u;
 
+// Which of its workgroup this invocation is; `pixel_of` sets it, so every entry point
+// that traces calls that first.
+var<private> lane: u32;
+
 // The pixel of a place in tile order, MISS for one beyond the image's edge: tiles of
 // 8 x 8 pixels, one a workgroup, along a Z curve, so that rays that run together
 // start together.
 fn pixel_of(invocation: u32) -> u32 {
+    lane = invocation % 64u;
     let place = params.first_place + invocation;
     let tile = place / 64u;
     let along = place % 64u;
@@ -77,6 +82,10 @@ struct Decisions {
 @group(0) @binding(5) var<storage, read_write> decisions: array<Decisions>;
 
 const STOPPED = -1.0;
+
+// Rays of all kinds from which on it pays to look whether a point has anything near:
+// measured at 4 rays, where it does not, and at 32.
+const MANY = 16u;
 
 // The surface that a ray of this direction hit, its normal against the ray.
 fn met(hit: Hit, direction: vec3<f32>) -> Surface {
@@ -241,7 +250,7 @@ fn openness(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let origin = surface.point + surface.normal * params.offset;
     let frame = tangents(surface.normal);
-    let root = survey(surroundings(origin, surface.normal));
+    let root = survey(surroundings(origin, surface.normal), params.rays * (1u + SECONDARY_RAYS) >= MANY);
     if root == MISS {
         sums[pixel] += f32(params.rays) * f32(max(SECONDARY_RAYS, 1u));
         return;

@@ -3,6 +3,7 @@
 // Rays of AO are short: of the atrium's eight nodes a primary ray and five a
 // secondary ray, the first 1.3 are the same for all rays of a point, and a third of
 // the points has nothing near. The CPU has no twin of this: it changes no result.
+// What it saves: docs/gpu.md.
 
 // Which of four slots touch the surroundings, as in `four_met`, but inner nodes in
 // the order of slots.
@@ -47,12 +48,12 @@ fn rises(triangle: u32, s: Surroundings) -> bool {
     return max(max(a, b), c) >= s.floor_height;
 }
 
-// The root of a subtree that holds all that is near a point, MISS where nothing
-// is: what all rays of the point can begin at, or need not be traced for.
-fn survey(s: Surroundings) -> u32 {
+// The root of a subtree that holds all that is near a point: what all rays of the
+// point can begin at. Where `whole`, MISS for a point that has nothing near: to know
+// that costs as much as some rays.
+fn survey(s: Surroundings, whole: bool) -> u32 {
     var root = ROOT;
     var alone = true;
-    var stack: array<vec2<u32>, STACK>;
     var height = 0u;
     var group = vec2<u32>(0u, 0x1000000u);
     loop {
@@ -61,7 +62,7 @@ fn survey(s: Surroundings) -> u32 {
         group.y &= ~(0x1000000u << slot);
         let node = group.x + before;
         if group.y > 0x00ffffffu {
-            stack[height] = group;
+            stacks[height * 64u + lane] = group;
             height++;
         }
         let at = node * 5u;
@@ -71,6 +72,9 @@ fn survey(s: Surroundings) -> u32 {
         if alone {
             root = node;
             alone = countOneBits(near) == 1u && near > 0x00ffffffu;
+            if !alone && !whole {
+                return root;
+            }
         }
         var leaves = near & 0x00ffffffu;
         while leaves != 0u {
@@ -85,7 +89,7 @@ fn survey(s: Surroundings) -> u32 {
                 return MISS;
             }
             height--;
-            group = stack[height];
+            group = stacks[height * 64u + lane];
         }
     }
     return root;

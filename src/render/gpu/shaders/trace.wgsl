@@ -3,8 +3,15 @@
 // Five words of four a node: see `WideNode`.
 @group(0) @binding(1) var<storage, read> nodes: array<vec4<u32>>;
 
-const STACK = 24u;
+// Entries of the stacks of a workgroup, 64 a level. (As 64u * LEVELS in the type, naga
+// 30 panics.)
+override STACKS: u32 = 1536u;
 const ROOT = 0u;
+
+// Nodes to come back to, for each invocation of the workgroup an entry a level, the
+// invocations side by side: see `lane`. In memory of the invocation's own, methods
+// with secondary rays took 1.2 times as long.
+var<workgroup> stacks: array<vec2<u32>, STACKS>;
 
 // Entry or exit distances along one axis, of four slots.
 fn planes(bytes: u32, scale: f32, start: f32) -> vec4<f32> {
@@ -72,7 +79,6 @@ fn walk(ray: Ray, any: bool, front: bool) -> Hit {
 // The same for a ray that meets nothing outside a subtree.
 fn walk_from(root: u32, ray: Ray, any: bool, front: bool) -> Hit {
     var best = Hit(MISS, ray.tmax, vec3<f32>());
-    var stack: array<vec2<u32>, STACK>;
     var height = 0u;
     let signs = select(vec3<u32>(), vec3<u32>(1u, 2u, 4u), ray.direction < vec3<f32>());
     let octant = 7u - (signs.x + signs.y + signs.z);
@@ -85,7 +91,7 @@ fn walk_from(root: u32, ray: Ray, any: bool, front: bool) -> Hit {
             let before = countOneBits(group.y & ((1u << slot) - 1u) & 0xffu);
             group.y &= ~(1u << bit);
             if group.y > 0x00ffffffu {
-                stack[height] = group;
+                stacks[height * 64u + lane] = group;
                 height++;
             }
             let at = (group.x + before) * 5u;
@@ -111,7 +117,7 @@ fn walk_from(root: u32, ray: Ray, any: bool, front: bool) -> Hit {
                 return best;
             }
             height--;
-            group = stack[height];
+            group = stacks[height * 64u + lane];
         }
     }
     return best;

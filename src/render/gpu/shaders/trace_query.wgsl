@@ -8,7 +8,7 @@ enable wgpu_ray_query;
 const ROOT = 0u;
 
 // A driver's structure has no subtrees to begin at, and does not say what is near.
-fn survey(s: Surroundings) -> u32 {
+fn survey(s: Surroundings, whole: bool) -> u32 {
     return ROOT;
 }
 

@@ -2,7 +2,7 @@
 // the triangles they meet: trace.wgsl, trace_query.wgsl.
 
 // Three corners a triangle, in the order of the tree's leaves; the first one's w is
-// the triangle's number in the scene. Nine floats a triangle took longer to load.
+// the triangle's number in the scene.
 @group(0) @binding(2) var<storage, read> triangles: array<vec4<u32>>;
 
 const FAR_AWAY = 1e30;
