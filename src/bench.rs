@@ -85,8 +85,9 @@ pub struct MethodBench {
     pub primary_rays: u64,
     /// Secondary rays, all pixels.
     pub secondary_rays: u64,
-    /// Rays of all kinds a second in the median, millions.
-    pub million_rays_a_second: f64,
+    /// Rays of all kinds a second in the median, millions; null where it took no
+    /// time that the clock could tell.
+    pub million_rays_a_second: Option<f64>,
     /// Secondary rays over the extra time in the median, millions a second; null
     /// without extension, and where it took no time.
     pub million_secondary_rays_a_second: Option<f64>,
@@ -147,7 +148,7 @@ fn method(&(rays, name, _): &(u32, &str, Estimator), timed: &Timed, classic: &Ti
     let extended = timed.secondary > 0;
     let extra: Vec<f64> = timed.shade.iter().zip(&classic.shade).map(|(own, classic)| own - classic).collect();
     let extra_ms = extended.then(|| spread_ms(&extra));
-    let millions = |rays: u64, ms: f64| rays as f64 / ms * 1e-3;
+    let millions = |rays: u64, ms: f64| (ms > 0.0).then(|| rays as f64 / ms * 1e-3);
     MethodBench {
         method: name.to_owned(),
         rays,
@@ -156,9 +157,7 @@ fn method(&(rays, name, _): &(u32, &str, Estimator), timed: &Timed, classic: &Ti
         primary_rays: timed.primary,
         secondary_rays: timed.secondary,
         million_rays_a_second: millions(timed.primary + timed.secondary, ms.median),
-        million_secondary_rays_a_second: extra_ms
-            .filter(|extra| extra.median > 0.0)
-            .map(|extra| millions(timed.secondary, extra.median)),
+        million_secondary_rays_a_second: extra_ms.and_then(|extra| millions(timed.secondary, extra.median)),
     }
 }
 

@@ -231,3 +231,14 @@ fn it_is_chosen_on_the_command_line_and_refused_on_the_cpu() {
         assert!(!dir.path().join("x.png").exists());
     }
 }
+
+/// Light and AO of a composite fall on one surface, which rays find.
+#[test]
+fn a_composite_is_not_drawn() {
+    let args = ["composite", "plane", "--renderer", "gpu", "--g-buffer", "raster", "--out", "x.png"];
+    let dir = tempfile::tempdir().unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_aogauge")).current_dir(dir.path()).args(args).output().unwrap();
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    assert!(stderr.contains("by rays") && !dir.path().join("x.png").exists(), "{stderr}");
+}

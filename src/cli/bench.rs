@@ -92,13 +92,20 @@ fn gpu(args: &GpuArgs) -> Result<Exit, Failure> {
         rounds: rounds.counted,
         scenes: vec![],
     };
+    // What was measured before a scene failed is still told.
+    let mut failed = None;
     let bar = bar();
     let each = (rounds.warm_up + rounds.counted) as usize;
     for (i, s) in scenes.iter().enumerate() {
         let step = |round: u32| bar.step(i * each + round as usize, scenes.len() * each, &s.name);
         step(0);
-        let measured = scene(&gpu, s, &settings, step);
-        bench.scenes.push(measured.map_err(|e| Failure::usage(format!("scene '{}': {e}", s.name)))?);
+        match scene(&gpu, s, &settings, step) {
+            Ok(measured) => bench.scenes.push(measured),
+            Err(e) => {
+                failed = Some(Failure::render(&s.name, &e));
+                break;
+            }
+        }
     }
     drop(bar);
     if let Some(folder) = &args.out {
@@ -112,5 +119,5 @@ fn gpu(args: &GpuArgs) -> Result<Exit, Failure> {
         Format::Json => print(&json(&bench)?)?,
         Format::Text => print(&tables::plain(&bench))?,
     }
-    Ok(Exit::Pass)
+    failed.map_or(Ok(Exit::Pass), Err)
 }

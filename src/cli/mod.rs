@@ -12,7 +12,9 @@ mod run;
 mod scene;
 mod schema;
 
-use crate::{disk::DiskError, report::ReportError, run::RunError, scenes::SceneError, suite::SuiteError};
+use crate::{
+    disk::DiskError, render::RenderError, report::ReportError, run::RunError, scenes::SceneError, suite::SuiteError,
+};
 use clap::{Parser, Subcommand, ValueEnum};
 
 /// How a command ended, as the shell sees it. Where several hold, the first of
@@ -109,6 +111,15 @@ impl From<RunError> for Failure {
             _ => Exit::Usage,
         };
         Failure { exit, message: e.to_string() }
+    }
+}
+
+impl Failure {
+    /// What a renderer says of a scene: a device that fails leaves the work
+    /// incomplete, all else is how it was asked.
+    fn render(scene: &str, e: &RenderError) -> Self {
+        let exit = if matches!(e, RenderError::Device(_)) { Exit::Incomplete } else { Exit::Usage };
+        Failure { exit, message: format!("scene '{scene}': {e}") }
     }
 }
 

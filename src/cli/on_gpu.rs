@@ -9,7 +9,7 @@ pub(super) struct OnGpu {
     /// How the GPU finds what each pixel sees; rays unless given.
     #[arg(long, value_enum)]
     g_buffer: Option<GBufferBy>,
-    /// How the GPU finds what a ray meets; auto unless given.
+    /// How the GPU finds what a ray meets; software unless given.
     #[arg(long, value_enum)]
     traversal: Option<Traversal>,
 }
@@ -27,6 +27,11 @@ impl OnGpu {
     /// Whether anything was asked for.
     pub fn is_given(&self) -> bool {
         self.g_buffer.is_some() || self.traversal.is_some()
+    }
+
+    /// Whether the G-buffer is to be drawn.
+    pub fn draws(&self) -> bool {
+        self.g_buffer == Some(GBufferBy::Raster)
     }
 
     /// Refuses what only the GPU knows.

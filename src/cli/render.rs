@@ -79,7 +79,7 @@ pub(super) struct Method {
     #[arg(long, value_enum, default_value_t)]
     pub renderer: By,
     #[command(flatten)]
-    on_gpu: OnGpu,
+    pub on_gpu: OnGpu,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -268,7 +268,7 @@ const OPTIONS: [&str; 16] = [
 
 fn frames(args: &Args, scene: &Scene, estimator: Estimator, rays: u32) -> Result<Vec<Frame>, Failure> {
     let view = args.view.of(scene);
-    let fail = |e: RenderError| Failure::usage(format!("scene '{}': {e}", scene.name));
+    let fail = |e: RenderError| Failure::render(&scene.name, &e);
     let twin = args.twin.then(|| scene.twin());
     let geometry = Geometry::new(twin.as_ref().unwrap_or(scene)).map_err(fail)?;
     let gpu = args.method.gpu().map_err(fail)?;

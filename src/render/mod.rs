@@ -177,7 +177,7 @@ pub enum RenderError {
         largest: f32,
     },
     /// The renderer does not know the estimator.
-    #[error("the {renderer} renderer does not compute '{kind}' with these options; it knows {knows}")]
+    #[error("the {renderer} renderer does not compute '{kind}'; it knows {knows}")]
     Unsupported {
         /// `gpu`.
         renderer: &'static str,
@@ -195,7 +195,7 @@ pub enum RenderError {
     #[error("no GPU adapter was found: {0}")]
     NoAdapter(String),
     /// The scene is larger than the device takes in one binding.
-    #[error("the scene needs {needs} bytes for its {what}, but the adapter takes at most {limit} in one binding")]
+    #[error("{needs} bytes are needed for the {what}, but the adapter takes at most {limit} in one binding")]
     TooLarge {
         /// Nodes, triangles or pixels.
         what: &'static str,

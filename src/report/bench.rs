@@ -38,11 +38,12 @@ fn title(scene: &SceneBench) -> String {
 /// A row's numbers: ms, ms more, millions of rays a second of all and of the
 /// secondary kind.
 fn cells(m: &MethodBench) -> [String; 4] {
+    let rate = |r: Option<f64>| r.map_or_else(String::new, |r| format!("{r:.1}"));
     [
         spread(&m.ms),
         m.extra_ms.as_ref().map_or_else(String::new, spread),
-        format!("{:.1}", m.million_rays_a_second),
-        m.million_secondary_rays_a_second.map_or_else(String::new, |r| format!("{r:.1}")),
+        rate(m.million_rays_a_second),
+        rate(m.million_secondary_rays_a_second),
     ]
 }
 

@@ -6,7 +6,7 @@ use glam::Vec3;
 use obvhs::{BvhBuildParams, bvh2::builder::build_bvh2_from_tris, triangle::Triangle};
 use std::time::Duration;
 
-/// A node of the tree, 32 bytes, the same on the CPU and the GPU.
+/// A node of the tree, 32 bytes.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub struct Node {

@@ -8,7 +8,7 @@ use std::{
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Arc, Mutex, PoisonError,
-        atomic::{AtomicBool, Ordering},
+        atomic::{AtomicBool, AtomicU32, Ordering},
     },
     time::Duration,
 };
@@ -42,6 +42,9 @@ impl Default for Setup {
     }
 }
 
+/// Dispatches that are submitted before the device is waited for.
+const IN_FLIGHT: u32 = 64;
+
 /// An opened adapter.
 pub(super) struct Device {
     pub info: wgpu::AdapterInfo,
@@ -53,6 +56,8 @@ pub(super) struct Device {
     tick: Option<f32>,
     trouble: Arc<Trouble>,
     setup: Setup,
+    /// Dispatches so far.
+    submitted: AtomicU32,
 }
 
 /// What went wrong outside an error scope: a lost device, a driver's refusal.
@@ -136,7 +141,7 @@ impl Device {
             lost.lose(["the device was lost", message.trim()].join(" ").trim().to_owned());
         });
         let tick = (!timestamps.is_empty()).then(|| queue.get_timestamp_period());
-        Ok(Device { info, device, queue, ray_query, tick, trouble, setup: setup.clone() })
+        Ok(Device { info, device, queue, ray_query, tick, trouble, setup: setup.clone(), submitted: AtomicU32::new(0) })
     }
 
     /// Whether the device is of no use any more.
@@ -155,12 +160,16 @@ impl Device {
             wgpu::ShaderModuleDescriptor { label: Some(label), source: wgpu::ShaderSource::Wgsl(source.into()) };
         match self.setup.options.checks {
             Checks::On => self.device.create_shader_module(descriptor),
-            // SAFETY: all indices of our shaders come from what this program
-            // uploads (nodes and triangles of one tree, texels of whole textures,
-            // pixels of images that are as large as the dispatch says), and loops
-            // end with the rays, the lights or the tree, whose depth is checked
-            // against the stack. Tested by `checks_change_nothing`
-            // in tests/gpu.rs, which renders the same with every check on.
+            // SAFETY: every index of our shaders is within its buffer. Nodes, triangles,
+            // texels and numbers of triangles in images are those that this program
+            // uploaded or its shaders wrote; a texel's place is wrapped into its texture.
+            // Pixels are those of `pixel_of`, or are compared with the image's size
+            // before they are used: taps of screen space, of history and of the filter.
+            // A stack has an entry for each level of the tree, in the column of its own
+            // invocation. Loops end with the rays, the lights, the taps or the tree.
+            // Tested by `checks_change_nothing` in tests/gpu.rs, by
+            // `no_kernel_has_validation_errors` in tests.rs and by tests/smoothing.rs,
+            // which run all kernels but ray query's with every check on.
             Checks::Off => unsafe {
                 self.device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked())
             },
@@ -262,12 +271,24 @@ impl Device {
             t.note(&mut encoder, slot);
         }
         self.queue.submit([encoder.finish()]);
+        // Patience is for a dispatch that hangs, not for a job of many. What goes wrong
+        // is noted, and told by the next `check`.
+        if self.submitted.fetch_add(1, Ordering::Relaxed) % IN_FLIGHT == IN_FLIGHT - 1 {
+            match self.poll() {
+                Err(wgpu::PollError::Timeout) => drop(self.abandon()),
+                Err(e) => self.trouble.note(e.to_string()),
+                Ok(_) => {}
+            }
+        }
+    }
+
+    fn poll(&self) -> Result<wgpu::PollStatus, wgpu::PollError> {
+        self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(self.setup.patience) })
     }
 
     /// Waits until all that was submitted has run.
     pub fn wait(&self) -> Result<(), RenderError> {
-        let waited = wgpu::PollType::Wait { submission_index: None, timeout: Some(self.setup.patience) };
-        match self.device.poll(waited) {
+        match self.poll() {
             Err(wgpu::PollError::Timeout) => Err(self.abandon()),
             Err(e) => Err(RenderError::Device(e.to_string())),
             Ok(_) => self.check(),

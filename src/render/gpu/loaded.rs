@@ -20,11 +20,11 @@ use glam::Vec4;
 use smoothed::Filters;
 use std::{sync::Arc, time::Instant};
 
-/// Primary rays of one dispatch. A dispatch that runs for seconds is killed by
-/// some drivers; at these sizes a software driver (2 million rays a second) and a
+/// Rays of all kinds of one dispatch. A dispatch that runs for seconds is killed by
+/// some drivers; at these sizes a software driver (4 million rays a second) and a
 /// slow GPU (50 million) both stay below a third of a second.
-const RAYS_SOFTWARE: u64 = 1 << 19;
-const RAYS_HARDWARE: u64 = 1 << 23;
+const RAYS_SOFTWARE: u64 = 1 << 20;
+const RAYS_HARDWARE: u64 = 1 << 24;
 
 /// What the shader writes where its loops were stopped early.
 pub(super) const STOPPED: f32 = -1.0;
@@ -307,7 +307,8 @@ impl<'a> LoadedGpu<'a> {
     }
 
     pub(super) fn pieces(&self, job: &Job<'_>, program: &Program) -> Vec<Piece> {
-        pieces(places(job.view.resolution), job.rays, program.rays_an_invocation(), self.budget())
+        let budget = self.budget() / u64::from(program.rays_a_primary());
+        pieces(places(job.view.resolution), job.rays, program.rays_an_invocation(), budget)
     }
 
     pub fn budget(&self) -> u64 {

@@ -79,12 +79,10 @@ pub enum GBufferBy {
 /// How the GPU finds the triangles that a ray meets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Traversal {
-    /// Ray query on hardware that has it, by Vulkan; else software.
-    #[default]
-    Auto,
     /// The renderer's own tree, in a shader: on every adapter the same.
+    #[default]
     Software,
-    /// The driver's acceleration structure.
+    /// The driver's acceleration structure, where there is one. Experimental in wgpu.
     RayQuery,
 }
 

@@ -97,10 +97,19 @@ impl Program {
 
     /// Primary rays that one invocation traces at most.
     pub fn rays_an_invocation(&self) -> u32 {
-        match self.stage {
-            Stage::Openness => RAYS_AN_INVOCATION / (1 + self.method.extension.map_or(2, |e| e.secondary_rays)),
-            Stage::Indirect => RAYS_AN_INVOCATION / RAYS_A_PATH,
+        RAYS_AN_INVOCATION / self.rays_a_primary()
+    }
+
+    /// Rays of all kinds that a primary ray comes to at most, or about.
+    pub fn rays_a_primary(&self) -> u32 {
+        if self.stage == Stage::Indirect {
+            return RAYS_A_PATH;
         }
+        self.method.extension.map_or(1, |e| {
+            // Culled, a secondary ray is two.
+            let parts = if self.method.faces == Faces::Front && e.sides == Sides::Two { 2 } else { 1 };
+            1 + e.secondary_rays * parts
+        })
     }
 
     /// What all dispatches share: constants of the kernel.

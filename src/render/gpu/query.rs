@@ -13,11 +13,6 @@ pub(super) fn is_chosen(traversal: Traversal, adapter: &wgpu::Adapter) -> Result
     let has = adapter.features().contains(wgpu::Features::EXPERIMENTAL_RAY_QUERY);
     match traversal {
         Traversal::Software => Ok(false),
-        // Other backends have it, too, but nobody has held them against the CPU. A
-        // software adapter walks a driver's tree slower than our own.
-        Traversal::Auto => {
-            Ok(has && info.backend == wgpu::Backend::Vulkan && info.device_type != wgpu::DeviceType::Cpu)
-        }
         Traversal::RayQuery if has => Ok(true),
         Traversal::RayQuery => {
             Err(RenderError::RayQuery(format!("{} with this driver ({}) has none", info.name, info.backend)))

@@ -1,15 +1,16 @@
 //! Devices that fail: each failure ends one job with a sentence, and the next job
 //! is none the worse for it.
 
-use super::{Checks, Gpu, Options, Persistent, device::Setup};
+use super::{Checks, GBufferBy, Gpu, Options, Persistent, device::Setup};
 use crate::{
     render::{
-        Estimator, Falloff, Geometry, Job, LocalIndirect, RenderError, Renderer, Scale,
+        Estimator, Geometry, Job, RenderError, Renderer,
         composite::{Lighting, sun},
         cpu::Cpu,
         materials::Materials,
     },
     scenes::{Scene, Sky, Texture, View, Wrap, library},
+    suite::EstimatorFile,
 };
 use glam::Vec3;
 use std::{
@@ -155,28 +156,39 @@ fn what_exceeds_a_binding_is_named() {
     assert_eq!(too_large(gpu.lit(&geometry, &Materials::new(&scene), &light).err().unwrap()), "textures");
 }
 
-/// All kernels with wgpu's debugging flags, and the Vulkan validation layer where
-/// it is installed: no error, caught or not. Lit views are the same with and
-/// without checks at run time.
+/// All kernels but ray query's with wgpu's debugging flags, and the Vulkan
+/// validation layer where it is installed: no error, caught or not, and the same
+/// images with and without checks at run time.
 #[test]
 fn no_kernel_has_validation_errors() {
     let flags = wgpu::InstanceFlags::VALIDATION | wgpu::InstanceFlags::DEBUG;
     let scene = library::scene("pillar").unwrap();
     let geometry = Geometry::new(&scene).unwrap();
     let view = View { resolution: [37, 29], ..scene.look.view() };
-    let indirect = Estimator::LocalIndirect(LocalIndirect { falloff: Falloff::Step, scale: Scale::default() });
+    let method = |text: &str| toml::from_str::<EstimatorFile>(text).unwrap().build().unwrap().0;
+    let estimators = [
+        "kind = 'classic'",
+        "kind = 'local-indirect'",
+        "kind = 'extended'\nreceiver_plane = 'clipped'\ntemporal = { frames = 2, motion = [9, -7] }\ndenoise = {}",
+        "kind = 'hbao'",
+        "kind = 'gtao'",
+        "kind = 'gtao'\nthickness = 0.02",
+        "kind = 'classic'",
+    ]
+    .map(method);
     let lighting = Lighting { lights: vec![sun(97.0, 58.0, Vec3::ONE)], ambient: Vec3::ONE, sky: Sky::Uniform(1.0) };
-    let lit = [Checks::On, Checks::Off].map(|checks| {
-        let gpu = Gpu::set_up(Setup { options: Options { checks, ..Options::default() }, flags, ..Setup::default() })
-            .unwrap();
-        let mut loaded = gpu.load(&geometry).unwrap();
-        for estimator in [Estimator::CLASSIC, indirect, Estimator::CLASSIC] {
-            loaded.render(&job(&scene, &view, estimator)).unwrap();
-        }
-        let shaded = gpu.lit(&geometry, &Materials::new(&scene), &lighting).unwrap().shade(&view).unwrap();
-        gpu.device.guarded(|| Ok(())).unwrap();
-        shaded.iter().map(|s| (s.direct, s.depth, s.albedo, s.normal)).collect::<Vec<_>>()
-    });
-    assert!(lit[0].len() == 37 * 29 && lit[0].iter().any(|s| s.0 != Vec3::ZERO));
-    assert_eq!(lit[0], lit[1]);
+    for g_buffer in [GBufferBy::Rays, GBufferBy::Raster] {
+        let images = [Checks::On, Checks::Off].map(|checks| {
+            let options = Options { checks, g_buffer, ..Options::default() };
+            let gpu = Gpu::set_up(Setup { options, flags, ..Setup::default() }).unwrap();
+            let mut loaded = gpu.load(&geometry).unwrap();
+            let values = estimators.map(|estimator| loaded.render(&job(&scene, &view, estimator)).unwrap().values);
+            let shaded = gpu.lit(&geometry, &Materials::new(&scene), &lighting).unwrap().shade(&view).unwrap();
+            gpu.device.guarded(|| Ok(())).unwrap();
+            assert!(shaded.len() == 37 * 29 && shaded.iter().any(|s| s.direct != Vec3::ZERO));
+            let lit: Vec<_> = shaded.iter().map(|s| (s.direct, s.depth, s.albedo, s.normal)).collect();
+            (values.map(|v| v.iter().map(|v| v.to_bits()).collect::<Vec<_>>()), lit)
+        });
+        assert!(images[0] == images[1], "{g_buffer:?}");
+    }
 }

@@ -56,7 +56,10 @@ fn indirect(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let surface = surfaces[pixel];
+    let at = pixel * 3u;
     if surface.triangle == MISS {
+        // What a job before may have left.
+        sums[at] = 0.0;
         return;
     }
     let sampler = sampler_seed(params.seed, pixel, params.replicate);
@@ -67,7 +70,6 @@ fn indirect(@builtin(global_invocation_id) id: vec3<u32>) {
         sum += path.light;
         done += select(0u, 1u, path.ended);
     }
-    let at = pixel * 3u;
     // The first dispatch of a job finds what the job before left.
     let first = params.first_ray == 0u;
     // As in openness: a driver that stops loops must not pass.

@@ -61,6 +61,16 @@ fn number(triangle: u32) -> u32 {
     return triangles[triangle * 3u].w;
 }
 
+// a b - c d with the right sign (Kahan; Jeannerod, Louvet, Muller, Mathematics of
+// Computation 82, 2013). The CPU has the plain formula: its rounded products are
+// compared as they are. Here a driver may fuse one of the two products into the
+// subtraction and round only the other; then a ray through an edge could miss both
+// triangles at it.
+fn difference_of_products(a: f32, b: f32, c: f32, d: f32) -> f32 {
+    let cd = c * d;
+    return fma(a, b, -cd) + fma(-c, d, cd);
+}
+
 fn meets(ray: Ray, triangle: u32, tmax: f32) -> Meeting {
     let a = permute(corner(triangle, 0u) - ray.origin, ray.axis);
     let b = permute(corner(triangle, 1u) - ray.origin, ray.axis);
@@ -71,9 +81,9 @@ fn meets(ray: Ray, triangle: u32, tmax: f32) -> Meeting {
     let by = b.y - ray.shear.y * b.z;
     let cx = c.x - ray.shear.x * c.z;
     let cy = c.y - ray.shear.y * c.z;
-    let u = cx * by - cy * bx;
-    let v = ax * cy - ay * cx;
-    let w = bx * ay - by * ax;
+    let u = difference_of_products(cx, by, cy, bx);
+    let v = difference_of_products(ax, cy, ay, cx);
+    let w = difference_of_products(bx, ay, by, ax);
     let det = u + v + w;
     if ((u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0)) || det == 0.0 {
         return Meeting(false, 0.0, vec3<f32>());
