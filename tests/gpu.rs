@@ -177,7 +177,7 @@ fn what_the_gpu_does_not_compute_is_refused() {
 
 #[test]
 fn look_views_agree_ray_by_ray() {
-    for name in ["curtain-room", "pillar"] {
+    for name in ["curtain-room", "pillar", "blinds", "banner"] {
         compare(name, |s| s.look.view(), 8, &ESTIMATORS);
     }
 }

@@ -92,7 +92,7 @@ fn met(hit: Hit, direction: vec3<f32>) -> Surface {
     let a = corner(hit.triangle, 0u);
     let b = corner(hit.triangle, 1u);
     let c = corner(hit.triangle, 2u);
-    let normal = normalize(cross(b - a, c - a));
+    let normal = unit(cross(b - a, c - a));
     let point = a * hit.weights.x + b * hit.weights.y + c * hit.weights.z;
     return Surface(point, hit.triangle, select(normal, -normal, dot(normal, direction) > 0.0), 0u);
 }
@@ -101,7 +101,7 @@ fn met(hit: Hit, direction: vec3<f32>) -> Surface {
 // Twin: View::ray.
 fn view_ray(x: f32, y: f32) -> Ray {
     let origin = params.origin + params.origin_dx * x + params.origin_dy * y;
-    let direction = normalize(params.direction + params.direction_dx * x + params.direction_dy * y);
+    let direction = unit(params.direction + params.direction_dx * x + params.direction_dy * y);
     return new_ray(origin, direction, FAR_AWAY);
 }
 

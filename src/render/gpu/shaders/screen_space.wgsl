@@ -58,7 +58,7 @@ fn new_point(pixel: u32) -> Point {
     let surface = surfaces[pixel];
     let perspective = params.perspective != 0u;
     let from_eye = surface.point - params.eye;
-    let to_eye = normalize(select(params.backwards, -from_eye, perspective));
+    let to_eye = unit(select(params.backwards, -from_eye, perspective));
     let frame = tangents(to_eye);
     let width = params.resolution.x;
     let row = vec3<f32>(params.to_image_x.z, params.to_image_y.z, params.to_image_z.z);
@@ -114,7 +114,7 @@ fn cosine_of(point: Point, there: vec3<f32>) -> f32 {
 
 fn behind(point: Point, there: vec3<f32>, thickness: f32) -> vec3<f32> {
     let away = select(-params.backwards, point.point + there - params.eye, params.perspective != 0u);
-    return there + normalize(away) * thickness;
+    return there + unit(away) * thickness;
 }
 
 fn horizon(point: Point, on: Way, r: f32) -> Horizon {

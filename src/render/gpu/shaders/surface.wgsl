@@ -18,3 +18,9 @@ fn tangents(n: vec3<f32>) -> array<vec3<f32>, 2> {
         vec3<f32>(b, s + n.y * n.y * a, -n.y),
     );
 }
+
+// A vector of length 1 as the CPU makes it: `normalize` may be looser, and rays that
+// start or point elsewhere by a hair meet other triangles at thin edges.
+fn unit(v: vec3<f32>) -> vec3<f32> {
+    return v * (1.0 / sqrt(v.x * v.x + v.y * v.y + v.z * v.z));
+}
