@@ -186,7 +186,7 @@ impl Page {
             ("timestamps", f.timestamps.then(|| "timestamps".to_owned())),
             ("subgroups", subgroups),
             ("16-bit floats", f.f16.then(|| "16-bit floats".to_owned())),
-            ("ray query", f.ray_query.then(|| "ray query".to_owned())),
+            ("ray query (only --traversal ray-query asks for it)", f.ray_query.then(|| "ray query".to_owned())),
             ("immediates", f.immediates.map(|n| format!("immediates of {n} bytes"))),
         ]
         .into_iter()
