@@ -154,3 +154,24 @@ fn the_cpu_has_no_traversal_to_choose() {
         assert!(stderr.contains("--traversal is for the GPU"), "{stderr}");
     }
 }
+
+/// What an adapter lacks costs the cases on it, and not those on the CPU.
+#[test]
+fn a_run_goes_on_without_what_the_adapter_lacks() {
+    let lacks = Gpu::with(Options { traversal: Traversal::RayQuery, ..Options::default() }).is_err();
+    let dir = tempfile::tempdir().unwrap();
+    let suite = "description = 'x'\nscenes = ['plane']\nrays = [4]\nreplicates = 2\nconverged_rays = 16\n\
+                 look_rays = 1\n[[estimator]]\nname = 'classic'\nkind = 'classic'\n";
+    std::fs::write(dir.path().join("x.toml"), suite).unwrap();
+    let args = ["run", "x.toml", "--renderer", "gpu", "--traversal", "ray-query", "--no-cache", "--out", "out"];
+    let output = Command::new(env!("CARGO_BIN_EXE_aogauge")).current_dir(dir.path()).args(args).output().unwrap();
+    let record = aogauge::record::Record::read(&dir.path().join("out")).unwrap();
+    let errors: Vec<&str> = record.cases.iter().map(|c| c.error.as_deref().unwrap_or_default()).collect();
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    if lacks {
+        assert_eq!(output.status.code(), Some(5), "{stderr}");
+        assert!(errors.len() == 2 && errors[0].is_empty() && errors[1].contains("ray query"), "{errors:?}");
+    } else {
+        assert_eq!((output.status.code(), errors), (Some(0), vec!["", ""]), "{stderr}");
+    }
+}

@@ -5,7 +5,7 @@ use crate::{
     judge_cache::JudgeCache,
     record::{Machine, Record, RecordFolder},
     render::{
-        Renderer,
+        RenderError, Renderer,
         cpu::Cpu,
         gpu::{Gpu, Persistent},
     },
@@ -115,17 +115,23 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
 }
 
 /// Checks everything, then makes the folder, then renders.
-fn render(args: &Args, suite: &Suite, gpu: Option<Gpu>, missing: &str) -> Result<(Record, RecordFolder), Failure> {
+fn render(
+    args: &Args,
+    suite: &Suite,
+    gpu: Option<Result<Gpu, RenderError>>,
+    missing: &str,
+) -> Result<(Record, RecordFolder), Failure> {
     let platform = match &gpu {
         None => Platform::Cpu,
-        Some(gpu) if gpu.is_software() && args.renderer == Choice::Auto => Platform::SoftwareGpu,
+        Some(Ok(gpu)) if gpu.is_software() && args.renderer == Choice::Auto => Platform::SoftwareGpu,
         Some(_) => Platform::Gpu,
     };
     let plan = Plan::new(suite, platform, args.seed);
-    let machine = Machine::here(
-        gpu.as_ref().map_or_else(|| missing.to_owned(), Gpu::describe),
-        gpu.as_ref().map(Gpu::is_software),
-    );
+    let machine = match &gpu {
+        None => Machine::here(missing.to_owned(), None),
+        Some(Ok(gpu)) => Machine::here(gpu.describe(), Some(gpu.is_software())),
+        Some(Err(e)) => Machine::here(e.to_string(), None),
+    };
     let gpu = gpu.map(Persistent::new);
     let prepared = Prepared::new(&plan)?;
     let folder = RecordFolder::create(&args.out)?;
@@ -138,9 +144,13 @@ fn render(args: &Args, suite: &Suite, gpu: Option<Gpu>, missing: &str) -> Result
     Ok((record, folder))
 }
 
-/// The GPU, or why there is none.
-fn open(args: &Args) -> Result<(Option<Gpu>, String), Failure> {
-    let gpu = || Gpu::with(args.on_gpu.options());
+/// The GPU, or why there is none. An adapter that lacks what was asked for costs
+/// the cases on it, not those on the CPU.
+fn open(args: &Args) -> Result<(Option<Result<Gpu, RenderError>>, String), Failure> {
+    let gpu = || match Gpu::with(args.on_gpu.options()) {
+        Err(e @ (RenderError::RayQuery(_) | RenderError::Raster(_))) => Ok(Err(e)),
+        gpu => gpu.map(Ok),
+    };
     match args.renderer {
         Choice::Cpu => {
             args.on_gpu.refuse()?;
@@ -212,7 +222,7 @@ within = 0.001
             format: Format::Text,
         };
         // The first case loads, compiles and runs by then.
-        let (_, folder) = render(&args, &suite, Some(losing([9])), "").unwrap();
+        let (_, folder) = render(&args, &suite, Some(Ok(losing([9]))), "").unwrap();
         let record = Record::read(folder.path()).unwrap();
         let failed: Vec<_> = record.cases.iter().filter(|c| c.error.is_some()).collect();
         assert!(failed.len() == 1 && failed[0].case.renderer == "gpu", "{failed:?}");

@@ -24,15 +24,19 @@ struct LoadedPersistent<'a> {
 }
 
 impl Persistent {
-    /// Begins with an open GPU.
-    pub fn new(gpu: Gpu) -> Self {
+    /// Begins with an open GPU, or with why there is none as it was asked for: then
+    /// every case ends with that.
+    pub fn new(gpu: Result<Gpu, RenderError>) -> Self {
         let devices: [OnceLock<Result<Gpu, RenderError>>; MOST] = Default::default();
-        devices[0].get_or_init(|| Ok(gpu));
+        devices[0].get_or_init(|| gpu);
         Persistent { devices }
     }
 
     /// The device in use, opened anew where the last one was lost.
     fn current(&self) -> Result<&Gpu, RenderError> {
+        if let Some(Err(e)) = self.devices[0].get() {
+            return Err(RenderError::Device(e.to_string()));
+        }
         let mut first = None;
         for device in &self.devices {
             match device.get() {

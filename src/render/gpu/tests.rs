@@ -55,7 +55,7 @@ fn after_a_loss_the_scene_is_loaded_on_a_new_device() {
     let differ = |values: &[f32]| values.iter().zip(&expected).filter(|(a, b)| a.to_bits() != b.to_bits()).count();
     // Loading, buffers, two kernels, the dispatch: each may be what is under way.
     for at in 1..6 {
-        let gpu = Persistent::new(losing([at]));
+        let gpu = Persistent::new(Ok(losing([at])));
         let mut loaded = gpu.load(&geometry).unwrap();
         let message = loaded.render(&job).unwrap_err().to_string();
         assert!(message.contains("the device was lost"), "{at}: {message}");
@@ -72,7 +72,7 @@ fn a_driver_that_goes_on_losing_devices_is_given_up() {
     let geometry = Geometry::new(&scene).unwrap();
     let view = scene.measure.view();
     let job = job(&scene, &view, Estimator::CLASSIC);
-    let gpu = Persistent::new(losing(1..100));
+    let gpu = Persistent::new(Ok(losing(1..100)));
     let mut loaded = gpu.load(&geometry).unwrap();
     for _ in 0..4 {
         let message = loaded.render(&job).unwrap_err().to_string();

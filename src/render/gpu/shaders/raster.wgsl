@@ -66,7 +66,11 @@ fn meets_near(ray: Ray, triangle: u32) -> Hit {
     let p = a.xy - ray.shear.xy * a.z;
     let q = b.xy - ray.shear.xy * b.z;
     let r = c.xy - ray.shear.xy * c.z;
-    let edges = vec3<f32>(r.x * q.y - r.y * q.x, p.x * r.y - p.y * r.x, q.x * p.y - q.y * p.x);
+    let edges = vec3<f32>(
+        difference_of_products(r.x, q.y, r.y, q.x),
+        difference_of_products(p.x, r.y, p.y, r.x),
+        difference_of_products(q.x, p.y, q.y, p.x),
+    );
     let det = edges.x + edges.y + edges.z;
     let inside = max(edges * select(1.0, -1.0, det < 0.0), vec3<f32>());
     let sum = inside.x + inside.y + inside.z;
