@@ -341,14 +341,14 @@ fn composite(
     rays: u32,
     lighting: &Lighting,
 ) -> Result<Composite, Failure> {
-    let fail = |e: RenderError| Failure::render(&scene.name, &e);
-    let geometry = Geometry::new(scene).map_err(fail)?;
-    let materials = Materials::new(scene);
-    let gpu = args.method.gpu().map_err(fail)?;
     if args.method.on_gpu.draws() {
         // Light and AO of a pixel must fall on one surface.
         return Err(Failure::usage("--g-buffer raster: a composite finds what pixels see by rays"));
     }
+    let fail = |e: RenderError| Failure::render(&scene.name, &e);
+    let geometry = Geometry::new(scene).map_err(fail)?;
+    let materials = Materials::new(scene);
+    let gpu = args.method.gpu().map_err(fail)?;
     let renderer: &dyn Renderer = gpu.as_ref().map_or(&Cpu, |g| g);
     let mut loaded = renderer.load(&geometry).map_err(fail)?;
     let methods: Vec<Option<Estimator>> = methods.iter().map(|(_, e)| *e).collect();

@@ -465,10 +465,12 @@ impl Timer {
         encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.ticks, slot * TICKS, TICKS);
     }
 
-    /// Seconds that each dispatch took.
-    pub fn seconds(&self, device: &Device) -> Result<Vec<f64>, RenderError> {
-        let ticks: Vec<[u64; 2]> = device.read(&self.ticks)?;
-        let seconds = |[a, b]: &[u64; 2]| b.saturating_sub(*a) as f64 * f64::from(self.tick) * 1e-9;
-        Ok(ticks.iter().map(seconds).collect())
+    /// Seconds that all dispatches took together; `wall`, the CPU's own count of
+    /// them, where there is no timer.
+    pub fn total(timer: Option<&Timer>, device: &Device, wall: f64) -> Result<f64, RenderError> {
+        let Some(timer) = timer else { return Ok(wall) };
+        let ticks: Vec<[u64; 2]> = device.read(&timer.ticks)?;
+        let seconds = |[a, b]: &[u64; 2]| b.saturating_sub(*a) as f64 * f64::from(timer.tick) * 1e-9;
+        Ok(ticks.iter().map(seconds).sum())
     }
 }

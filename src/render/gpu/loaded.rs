@@ -348,10 +348,7 @@ impl Loaded for LoadedGpu<'_> {
             }
             let surfaces: Vec<Surface> = self.gpu.device.read(&images.surfaces)?;
             let decisions = self.gpu.device.read(&images.decisions)?;
-            let seconds = match &timer {
-                Some(timer) => timer.seconds(&self.gpu.device)?.iter().sum(),
-                None => wall,
-            };
+            let seconds = Timer::total(timer.as_ref(), &self.gpu.device, wall)?;
             let (values, colors) = finished(&program, &sums, &surfaces, job.rays);
             Ok(Frame {
                 resolution: job.view.resolution,

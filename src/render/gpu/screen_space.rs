@@ -109,7 +109,7 @@ impl OnScreen {
             sums: device.storage("sums", screen.gathered.len() as u64 * size_of::<f32>() as u64)?,
             params: device.uniform("params", &Params::zeroed())?,
             resolution: job.view.resolution,
-            seen: points.surfaces.iter().map(|s| s.map_or(u32::MAX, |s| s.triangle)).collect(),
+            seen: points.triangles(),
             screen,
         })
     }
@@ -144,10 +144,7 @@ impl Rendering<'_> {
                 colors: None,
                 decisions: None,
                 seen: on.seen.clone(),
-                seconds: match &timer {
-                    Some(timer) => timer.seconds(device)?.iter().sum(),
-                    None => wall,
-                },
+                seconds: Timer::total(timer.as_ref(), device, wall)?,
             })
         })
     }

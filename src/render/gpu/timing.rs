@@ -120,6 +120,6 @@ impl LoadedGpu<'_> {
         work(timer.as_ref())?;
         device.wait()?;
         let wall = start.elapsed().as_secs_f64();
-        timer.map_or(Ok(wall), |t| Ok(t.seconds(device)?.iter().sum()))
+        Timer::total(timer.as_ref(), device, wall)
     }
 }

@@ -147,10 +147,7 @@ impl LoadedGpu<'_> {
             return Err(super::stopped());
         }
         let surfaces: Vec<Surface> = device.read(&images.surfaces)?;
-        let seconds = match &timer {
-            Some(timer) => timer.seconds(device)?.iter().sum(),
-            None => wall,
-        };
+        let seconds = Timer::total(timer.as_ref(), device, wall)?;
         let finished = |(&value, s): (&f32, &Surface)| {
             if s.triangle == u32::MAX { f32::NAN } else { program.method.finished(f64::from(value)) }
         };

@@ -60,26 +60,16 @@ fn meets_near(ray: Ray, triangle: u32) -> Hit {
     if meeting.met {
         return Hit(triangle, meeting.t, meeting.weights);
     }
-    let a = permute(corner(triangle, 0u) - ray.origin, ray.axis);
-    let b = permute(corner(triangle, 1u) - ray.origin, ray.axis);
-    let c = permute(corner(triangle, 2u) - ray.origin, ray.axis);
-    let p = a.xy - ray.shear.xy * a.z;
-    let q = b.xy - ray.shear.xy * b.z;
-    let r = c.xy - ray.shear.xy * c.z;
-    let edges = vec3<f32>(
-        difference_of_products(r.x, q.y, r.y, q.x),
-        difference_of_products(p.x, r.y, p.y, r.x),
-        difference_of_products(q.x, p.y, q.y, p.x),
-    );
-    let det = edges.x + edges.y + edges.z;
-    let inside = max(edges * select(1.0, -1.0, det < 0.0), vec3<f32>());
+    let seen = seen_by(ray, triangle);
+    let det = seen.areas.x + seen.areas.y + seen.areas.z;
+    let inside = max(seen.areas * select(1.0, -1.0, det < 0.0), vec3<f32>());
     let sum = inside.x + inside.y + inside.z;
     if sum == 0.0 {
         // Seen edge-on: no point is nearer than another.
         return Hit(MISS, 0.0, vec3<f32>());
     }
     let weights = inside / sum;
-    let t = ray.shear.z * (weights.x * a.z + weights.y * b.z + weights.z * c.z);
+    let t = ray.shear.z * (weights.x * seen.along.x + weights.y * seen.along.y + weights.z * seen.along.z);
     return Hit(select(MISS, triangle, t > 0.0), t, weights);
 }
 

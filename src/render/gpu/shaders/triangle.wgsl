@@ -71,7 +71,14 @@ fn difference_of_products(a: f32, b: f32, c: f32, d: f32) -> f32 {
     return fma(a, b, -cd) + fma(-c, d, cd);
 }
 
-fn meets(ray: Ray, triangle: u32, tmax: f32) -> Meeting {
+// Signed areas opposite to a triangle's corners, as the ray sees them, and how far
+// along the ray's longest axis the corners lie.
+struct Seen {
+    areas: vec3<f32>,
+    along: vec3<f32>,
+}
+
+fn seen_by(ray: Ray, triangle: u32) -> Seen {
     let a = permute(corner(triangle, 0u) - ray.origin, ray.axis);
     let b = permute(corner(triangle, 1u) - ray.origin, ray.axis);
     let c = permute(corner(triangle, 2u) - ray.origin, ray.axis);
@@ -81,15 +88,25 @@ fn meets(ray: Ray, triangle: u32, tmax: f32) -> Meeting {
     let by = b.y - ray.shear.y * b.z;
     let cx = c.x - ray.shear.x * c.z;
     let cy = c.y - ray.shear.y * c.z;
-    let u = difference_of_products(cx, by, cy, bx);
-    let v = difference_of_products(ax, cy, ay, cx);
-    let w = difference_of_products(bx, ay, by, ax);
+    let areas = vec3<f32>(
+        difference_of_products(cx, by, cy, bx),
+        difference_of_products(ax, cy, ay, cx),
+        difference_of_products(bx, ay, by, ax),
+    );
+    return Seen(areas, vec3<f32>(a.z, b.z, c.z));
+}
+
+fn meets(ray: Ray, triangle: u32, tmax: f32) -> Meeting {
+    let seen = seen_by(ray, triangle);
+    let u = seen.areas.x;
+    let v = seen.areas.y;
+    let w = seen.areas.z;
     let det = u + v + w;
     if ((u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0)) || det == 0.0 {
         return Meeting(false, 0.0, vec3<f32>());
     }
-    let t = ray.shear.z * (u * a.z + v * b.z + w * c.z) / det;
-    return Meeting(t > 0.0 && t <= tmax, t, vec3<f32>(u, v, w) / det);
+    let t = ray.shear.z * (u * seen.along.x + v * seen.along.y + w * seen.along.z) / det;
+    return Meeting(t > 0.0 && t <= tmax, t, seen.areas / det);
 }
 
 // Whether a triangle turns its front against a ray of this direction.
