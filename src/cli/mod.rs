@@ -1,6 +1,7 @@
 //! The command line: one file a verb, and what they share: exit codes.
 
 mod bench;
+mod compare;
 mod composite;
 mod doctor;
 mod flatland;
@@ -54,6 +55,7 @@ pub struct Cli {
 enum Verb {
     Run(run::Args),
     Render(render::Args),
+    Compare(compare::Args),
     Composite(composite::Args),
     Report(report::Args),
     #[command(subcommand)]
@@ -132,6 +134,7 @@ impl Cli {
         match self.verb {
             Verb::Run(args) => run::execute(&args),
             Verb::Render(args) => render::execute(&args),
+            Verb::Compare(args) => compare::execute(&args),
             Verb::Composite(args) => composite::execute(&args),
             Verb::Report(args) => report::execute(&args),
             Verb::Golden(verb) => golden::execute(&verb),

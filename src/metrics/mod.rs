@@ -3,6 +3,7 @@
 
 pub mod artifact;
 pub mod error;
+pub mod image;
 pub mod judge;
 pub mod profile;
 pub mod regions;

@@ -2,5 +2,6 @@
 //! pictures side by side in one.
 
 pub mod lettering;
+pub mod read;
 pub mod split;
 pub mod tone;

@@ -1,0 +1,122 @@
+//! `aogauge compare`
+
+use super::{Exit, Failure, Format, json, print, tell};
+use crate::{
+    metrics::image::{DEFAULT_PPD, Encoding, Image, NonFinite, Options, Pair, Scores, scores},
+    picture::read::read,
+};
+use clap::ValueEnum;
+use std::path::{Path, PathBuf};
+
+/// Compare an image with a reference of the same view, by every full-reference metric.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  aogauge compare reference.png test.png\n  \
+aogauge compare reference.exr test.exr --layer mean --mask footprint.png\n  \
+aogauge compare reference.hdr test.hdr --hdr --format json\n\n\
+OpenEXR, PNG, JPEG, Radiance HDR and TIFF. docs/metrics.md tells what each metric sees and misses."
+)]
+pub struct Args {
+    /// What to compare with.
+    reference: PathBuf,
+    /// What is compared.
+    test: PathBuf,
+    /// The layer of OpenEXR images; R, G and B, else Y, else mean unless given.
+    #[arg(long)]
+    layer: Option<String>,
+    /// What the numbers stand for; integers are sRGB codes and floats linear unless given.
+    #[arg(long, value_enum)]
+    encoding: Option<Meaning>,
+    /// An image that weighs pixels: black 0, white 1.
+    #[arg(long)]
+    mask: Option<PathBuf>,
+    /// Pixels per degree for FLIP.
+    #[arg(long, default_value_t = DEFAULT_PPD)]
+    ppd: f64,
+    /// HDR-FLIP too: linear images beyond 0 to 1. It costs a FLIP an exposure.
+    #[arg(long)]
+    hdr: bool,
+    /// SSIMULACRA2 too. It costs several times the rest.
+    #[arg(long)]
+    ssimulacra2: bool,
+    /// What is printed on standard output.
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+/// `--encoding`
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Meaning {
+    /// Linear light or openness.
+    Linear,
+    /// sRGB codes.
+    Srgb,
+}
+
+impl From<Meaning> for Encoding {
+    fn from(m: Meaning) -> Self {
+        match m {
+            Meaning::Linear => Encoding::Linear,
+            Meaning::Srgb => Encoding::Srgb,
+        }
+    }
+}
+
+/// Compares two images.
+pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
+    let encoding = args.encoding.map(Encoding::from);
+    let layer = args.layer.as_deref();
+    let reference = read(&args.reference, layer, encoding)?;
+    let test = read(&args.test, layer, encoding)?;
+    let mask = args.mask.as_deref().map(read_mask).transpose()?;
+    let between = |e: crate::metrics::image::ImageError| {
+        Failure::usage(format!("{} and {}: {e}", args.reference.display(), args.test.display()))
+    };
+    let pair = Pair::new(&reference.image, &test.image, mask.as_deref()).map_err(between)?;
+    let options = Options { ppd: args.ppd, hdr: args.hdr, exposures: None, ssimulacra2: args.ssimulacra2 };
+    let (found, _) = scores(&pair, &options).map_err(between)?;
+    match args.format {
+        Format::Text => print(&table(&found))?,
+        Format::Json => print(&json(&found)?)?,
+    }
+    let NonFinite { reference, test, both } = found.non_finite;
+    if reference + test + both > 0 {
+        tell(&format!(
+            "warning: NaN or infinity at {reference} pixels of the reference alone, {test} of the test image alone and {both} of both; they are left out"
+        ));
+    }
+    Ok(Exit::Pass)
+}
+
+/// A mask's weights: linear, the mean of its channels.
+fn read_mask(path: &Path) -> Result<Vec<f32>, Failure> {
+    let image: Image = read(path, None, Some(Encoding::Linear))?.image;
+    let planes = image.planes();
+    let weight = |i: usize| planes.iter().map(|p| p[i]).sum::<f32>() / planes.len() as f32;
+    Ok((0..image.pixels()).map(weight).collect())
+}
+
+fn table(found: &Scores) -> String {
+    let [width, height] = found.size;
+    let mut text = format!(
+        "{width} x {height} pixels, {} channel{}, {}; FLIP at {} pixels per degree\n\n",
+        found.channels,
+        if found.channels == 1 { "" } else { "s" },
+        found.encoding.label(),
+        found.ppd
+    );
+    for score in &found.scores {
+        let value = score.value.map_or_else(|| "–".to_owned(), |v| format!("{v:.6}"));
+        let why = score.note.as_deref().unwrap_or_else(|| score.name.reading());
+        text += &format!("{:<14} {value:>12}   {why}\n", score.name.label());
+    }
+    text += &format!("\n{:<14} {:>10} {:>10} {:>10} {:>10}  at\n", "map", "median", "95 %", "99 %", "max");
+    for (name, map) in &found.maps {
+        let [x, y] = map.max_at;
+        text += &format!(
+            "{name:<14} {:>10.6} {:>10.6} {:>10.6} {:>10.6}  {x}, {y}\n",
+            map.median, map.p95, map.p99, map.max
+        );
+    }
+    text
+}
