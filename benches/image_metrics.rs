@@ -4,6 +4,8 @@
 //! The memory of the set, in bytes a pixel, is what divan's allocation profiler
 //! prints as "max alloc".
 
+#![allow(missing_docs, clippy::unwrap_used)]
+
 use aogauge::metrics::image::{Encoding, Image, Options, Pair, flip, ms_ssim, pointwise, scores, ssim, summary};
 use divan::{AllocProfiler, Bencher, counter::ItemsCount};
 use std::sync::LazyLock;

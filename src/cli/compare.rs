@@ -10,12 +10,10 @@ use std::path::{Path, PathBuf};
 
 /// Compare an image with a reference of the same view, by every full-reference metric.
 #[derive(Debug, clap::Args)]
-#[command(
-    after_help = "Examples:\n  aogauge compare reference.png test.png\n  \
+#[command(after_help = "Examples:\n  aogauge compare reference.png test.png\n  \
 aogauge compare reference.exr test.exr --layer mean --mask footprint.png\n  \
 aogauge compare reference.hdr test.hdr --hdr --format json\n\n\
-OpenEXR, PNG, JPEG, Radiance HDR and TIFF. docs/metrics.md tells what each metric sees and misses."
-)]
+OpenEXR, PNG, JPEG, Radiance HDR and TIFF. docs/metrics.md tells what each metric sees and misses.")]
 pub struct Args {
     /// What to compare with.
     reference: PathBuf,

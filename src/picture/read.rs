@@ -166,7 +166,9 @@ mod tests {
     #[test]
     fn what_is_no_image_is_an_error() {
         let folder = tempfile::tempdir().unwrap();
-        for (name, bytes) in [("a.png", &b"no"[..]), ("b.png", b"\x89PNG\r\n\x1a\n0000"), ("c.exr", b""), ("d", b"words")] {
+        for (name, bytes) in
+            [("a.png", &b"no"[..]), ("b.png", b"\x89PNG\r\n\x1a\n0000"), ("c.exr", b""), ("d", b"words")]
+        {
             let path = folder.path().join(name);
             std::fs::write(&path, bytes).unwrap();
             let error = read(&path, None, None).unwrap_err().to_string();

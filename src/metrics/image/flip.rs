@@ -3,7 +3,7 @@
 use super::{
     Encoding, Image, ImageError, Pair,
     fast_math::{cbrt, pow, srgb_to_linear},
-    filter::{BAND, BLOCK, Ring, even, extend_row, odd},
+    filter::{BAND, BLOCK, Ring, even, even_of_sum_zero, extend_row, odd},
     hdr_flip::tone_mapped,
 };
 use pulp::{Arch, Simd, WithSimd};
@@ -31,7 +31,7 @@ const MIN_PPD: f64 = 1.0;
 const MAX_PPD: f64 = 1000.0;
 
 /// White, D65, of CIE XYZ, one over it.
-const INV_WHITE: [f32; 3] = [1.052_156_9, 1.0, 0.918_357_67];
+const INV_WHITE: [f32; 3] = [1.052_156_9, 1.0, 0.918_357_7];
 /// Exponents and limits of the paper, by its names.
 const QC: f32 = 0.7;
 const PC: f32 = 0.4;
@@ -187,7 +187,7 @@ impl Half {
         let [gaussian, slope, bend] = &tile.filters.features;
         even(gaussian, y, self.rings[4].row_mut(slot));
         odd(slope, y, self.rings[5].row_mut(slot));
-        even(bend, y, self.rings[6].row_mut(slot));
+        even_of_sum_zero(bend, y, self.rings[6].row_mut(slot));
     }
 
     /// Filters the columns about row `slot` of the rings.
@@ -205,7 +205,7 @@ impl Half {
         even(gaussian, at(5), edge_x);
         odd(slope, at(4), edge_y);
         even(gaussian, at(6), point_x);
-        even(bend, at(4), point_y);
+        even_of_sum_zero(bend, at(4), point_y);
     }
 }
 
@@ -356,13 +356,13 @@ type Row = [f32; BLOCK];
 #[inline(always)]
 fn error_row(reference: &[Row; 8], test: &[Row; 8], bounds: &Bounds, out: &mut Row) {
     let (mut colour, mut feature) = ([0.0; BLOCK], [0.0; BLOCK]);
-    for x in 0..BLOCK {
-        colour[x] = hyab(lab_at(reference, x), lab_at(test, x));
+    for (x, colour) in colour.iter_mut().enumerate() {
+        *colour = hyab(lab_at(reference, x), lab_at(test, x));
     }
-    for x in 0..BLOCK {
+    for (x, feature) in feature.iter_mut().enumerate() {
         let edge = (strength_at(reference, 4, x) - strength_at(test, 4, x)).abs();
         let point = (strength_at(reference, 6, x) - strength_at(test, 6, x)).abs();
-        feature[x] = (std::f32::consts::FRAC_1_SQRT_2 * if edge > point { edge } else { point }).sqrt();
+        *feature = (std::f32::consts::FRAC_1_SQRT_2 * if edge > point { edge } else { point }).sqrt();
     }
     for x in 0..BLOCK {
         out[x] = pow(bounds.redistribute(pow(colour[x], QC)), 1.0 - feature[x]);

@@ -97,7 +97,11 @@ pub(super) fn tone_mapped(x: f32) -> f32 {
 pub fn hdr_flip(pair: &Pair<'_>, ppd: f64, exposures: Exposures) -> Result<HdrFlip, ImageError> {
     let Exposures { start, stop, count } = exposures;
     if !(start.is_finite() && stop.is_finite() && start <= stop) {
-        return Err(ImageError::Range { what: "the first exposure", value: start, range: "finite, and not above the last" });
+        return Err(ImageError::Range {
+            what: "the first exposure",
+            value: start,
+            range: "finite, and not above the last",
+        });
     }
     if !(2..=MAX_EXPOSURES).contains(&count) {
         return Err(ImageError::Range { what: "the number of exposures", value: f64::from(count), range: "2 to 64" });

@@ -198,11 +198,11 @@ pub fn scores(pair: &Pair<'_>, options: &Options) -> Result<(Scores, Maps), Imag
     match ssim(pair) {
         Ok(finest) => {
             all.push(score(ScoreName::Ssim, Ok(finest.mean)));
-            all.push(score(ScoreName::MsSsim, ms_ssim(pair, &finest).map_err(absent)));
+            all.push(score(ScoreName::MsSsim, ms_ssim(pair, &finest).map_err(|e| absent(&e))));
             maps.ssim = finest.map;
         }
         Err(e) => {
-            all.extend([ScoreName::Ssim, ScoreName::MsSsim].map(|name| score(name, Err(absent(e.clone())))));
+            all.extend([ScoreName::Ssim, ScoreName::MsSsim].map(|name| score(name, Err(absent(&e)))));
         }
     }
     let mut exposures = None;
@@ -248,7 +248,7 @@ pub fn scores(pair: &Pair<'_>, options: &Options) -> Result<(Scores, Maps), Imag
     Ok((scores, maps))
 }
 
-fn absent(e: ImageError) -> Absent {
+fn absent(e: &ImageError) -> Absent {
     Absent(e.to_string())
 }
 
