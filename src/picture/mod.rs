@@ -1,7 +1,11 @@
-//! From light to a picture for the eye: exposure, tone mapping, and several
-//! pictures side by side in one.
+//! From light to a picture for the eye: exposure, tone mapping, several pictures side
+//! by side in one, and errors as colours with their scale; and back: pictures read as
+//! numbers.
 
+pub mod color_bar;
+pub mod error_map;
 pub mod lettering;
 pub mod read;
+pub mod scale;
 pub mod split;
 pub mod tone;

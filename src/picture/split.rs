@@ -1,6 +1,6 @@
 //! Several pictures of one view side by side in one, as in the paper's Fig. 8.
 
-use super::lettering;
+use super::lettering::{self, Ink};
 use image::{Rgb, RgbImage};
 use std::ops::Range;
 
@@ -37,7 +37,7 @@ pub fn mark(picture: &mut RgbImage, names: &[String]) {
     for (i, name) in names.iter().enumerate() {
         let columns = columns(i, names.len(), width);
         let place = [columns.start as f32 + 1.2 * size, height as f32 - 1.2 * size];
-        lettering::write(picture, name, place, size, columns);
+        lettering::write(picture, name, place, size, columns, &Ink::WHITE);
     }
     let half = divider(height);
     for i in 1..names.len() {

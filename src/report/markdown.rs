@@ -1,5 +1,6 @@
 //! The Markdown report.
 
+use super::error_maps::{self, LIMIT_CONVERGED, LIMIT_Q, MINUS_CONVERGED, MINUS_Q};
 use super::table::{self, Row, outcome_text, plus_minus, subject, value_text};
 use crate::{
     gate::{CONFIDENCE, Outcome},
@@ -25,7 +26,24 @@ struct Context<'a> {
     /// Whether any method is smoothed.
     smoothed: bool,
     pictures: &'a str,
+    maps: Maps,
     summary: String,
+}
+
+/// Where error maps are, and how far their scales reach.
+#[derive(Serialize)]
+struct Maps {
+    minus_q: &'static str,
+    limit_q: f64,
+    minus_converged: &'static str,
+    limit_converged: f64,
+}
+
+/// A method with the fewest rays that it was rendered with.
+#[derive(Serialize)]
+struct Fewest {
+    estimator: String,
+    rays: u32,
 }
 
 #[derive(Serialize)]
@@ -51,6 +69,8 @@ struct SceneSection {
     /// Where screen-space methods are computed, and what is seen from there.
     screen: Option<String>,
     estimators: Vec<String>,
+    /// Methods that there is a map of against their converged image.
+    fewest: Vec<Fewest>,
     cases: Vec<CaseRow>,
     regions: String,
     errors: Vec<String>,
@@ -180,11 +200,20 @@ fn section(record: &Record, scene: &SceneRecord) -> SceneSection {
         no_judge: scene.no_judge.clone(),
         screen: scene.screen.as_ref().map(|s| screen_text(scene, s)),
         estimators: record.suite.estimators.clone(),
+        fewest: fewest(record, scene),
         cases: cases.iter().filter(|c| c.error.is_none()).map(|c| case_row(record, c, scene.judge.is_some())).collect(),
         regions: scene.regions.iter().map(|(r, n)| format!("{} {n}", r.label())).collect::<Vec<_>>().join(", "),
         absent: absent(&cases),
         errors: cases.iter().filter_map(|c| Some(format!("`{}`: {}", c.case.id(), c.error.as_ref()?))).collect(),
     }
+}
+
+fn fewest(record: &Record, scene: &SceneRecord) -> Vec<Fewest> {
+    let of = |name: &String| {
+        let case = error_maps::fewest(record, scene, name).filter(|_| scene.judge.is_some())?;
+        Some(Fewest { estimator: name.clone(), rays: case.case.rays })
+    };
+    record.suite.estimators.iter().filter_map(of).collect()
 }
 
 /// Each reason for a missing number once.
@@ -240,6 +269,12 @@ pub fn text(record: &Record) -> Result<String, minijinja::Error> {
         judge_seconds,
         smoothed: record.suite.methods.values().any(|m| m.temporal.is_some() || m.denoise.is_some()),
         pictures: PICTURES,
+        maps: Maps {
+            minus_q: MINUS_Q,
+            limit_q: LIMIT_Q,
+            minus_converged: MINUS_CONVERGED,
+            limit_converged: LIMIT_CONVERGED,
+        },
         summary: record.summary_line(),
     }))
 }

@@ -2,6 +2,7 @@
 //! report can be made again from a record at any time.
 
 pub mod bench;
+mod error_maps;
 pub mod flatland;
 mod markdown;
 pub(crate) mod picture;
@@ -12,9 +13,10 @@ use crate::{
     disk::{DiskError, write_whole},
     layers::Layers,
     metrics::judge::too_noisy,
+    picture::error_map::MapError,
     record::{Record, SceneRecord},
 };
-use std::{io::Write, path::Path};
+use std::{collections::BTreeMap, io::Write, path::Path};
 
 /// The name of the report in its folder.
 pub const FILE: &str = "report.md";
@@ -32,6 +34,14 @@ pub enum ReportError {
         image: String,
         /// The layer.
         layer: String,
+    },
+    /// Two images of the record do not fit each other.
+    #[error("{image}: no error map can be drawn: {source}")]
+    Map {
+        /// One of them.
+        image: String,
+        /// Why.
+        source: MapError,
     },
     /// A plot could not be drawn.
     #[error("the plot of scene '{scene}' cannot be drawn: {message}")]
@@ -56,19 +66,19 @@ pub fn write(record_folder: &Path, out: &Path) -> Result<Record, ReportError> {
     for scene in &record.scenes {
         pictures(record_folder, &record, scene, &out.join(markdown::PICTURES).join(&scene.name))?;
     }
+    error_maps::bars(&record, &out.join(markdown::PICTURES))?;
     let text = markdown::text(&record)?;
     write_whole(&out.join(FILE), |buffer| buffer.write_all(text.as_bytes()))?;
     Ok(record)
 }
 
+fn layer(layers: &Layers, image: &str, name: &str) -> Result<Vec<f32>, ReportError> {
+    let missing = || ReportError::Layer { image: image.to_owned(), layer: name.to_owned() };
+    layers.get(name).map(<[f32]>::to_vec).ok_or_else(missing)
+}
+
 fn pictures(folder: &Path, record: &Record, scene: &SceneRecord, out: &Path) -> Result<(), ReportError> {
     let read = |image: &str| Layers::read(&folder.join(image));
-    let layer = |layers: &Layers, image: &str, name: &str| {
-        layers
-            .get(name)
-            .map(<[f32]>::to_vec)
-            .ok_or_else(|| ReportError::Layer { image: image.to_owned(), layer: name.to_owned() })
-    };
     let look = read(&scene.look)?;
     for name in &record.suite.estimators {
         let values = layer(&look, &scene.look, &format!("openness-{name}"))?;
@@ -78,13 +88,15 @@ fn pictures(folder: &Path, record: &Record, scene: &SceneRecord, out: &Path) -> 
     picture::irradiance(&traced, look.resolution, &out.join("path-traced.png"))?;
 
     let converged = read(&scene.image)?;
+    let mut shown = BTreeMap::new();
     for name in &record.suite.estimators {
         let values = match smoothed(record, scene, name) {
             Some(image) => layer(&read(image)?, image, "mean")?,
             None => layer(&converged, &scene.image, &format!("converged-{name}"))?,
         };
-        let (values, size) = middle(scene, &values);
-        picture::openness(&values, size, 4, &out.join("measure").join(format!("{name}.png")))?;
+        let (middle, size) = middle(scene, &values);
+        picture::openness(&middle, size, 4, &out.join("measure").join(format!("{name}.png")))?;
+        shown.insert(name.as_str(), values);
     }
     if let Some(judge) = &scene.judge {
         let layers = read(&judge.image)?;
@@ -94,6 +106,16 @@ fn pictures(folder: &Path, record: &Record, scene: &SceneRecord, out: &Path) -> 
             if too_noisy(se) {
                 *q = f32::NAN;
             }
+        }
+        for (name, test) in &shown {
+            let pair = error_maps::Pair { test, reference: &q, image: &judge.image };
+            let path = out.join(error_maps::MINUS_Q).join(format!("{name}.png"));
+            error_maps::write(scene, &pair, error_maps::LIMIT_Q, &path)?;
+            let Some(case) = error_maps::fewest(record, scene, name) else { continue };
+            let reference = &layer(&converged, &scene.image, &format!("converged-{name}"))?;
+            let pair = error_maps::Pair { test: &error_maps::mean(folder, case)?, reference, image: &scene.image };
+            let path = out.join(error_maps::MINUS_CONVERGED).join(format!("{name}.png"));
+            error_maps::write(scene, &pair, error_maps::LIMIT_CONVERGED, &path)?;
         }
         let (q, size) = middle(scene, &q);
         picture::openness(&q, size, 4, &out.join("q.png"))?;

@@ -19,6 +19,9 @@ pub type Replicates = Count<2, 1024>;
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SuiteFile {
+    /// Its name in record and report: 1 to 64 letters, digits, `-`, `_` and `.`. The
+    /// name of the file without its ending, unless given.
+    pub name: Option<String>,
     /// What the suite is for.
     pub description: String,
     /// Built-in scenes by name, others by path (ending in `.toml`) from this file.

@@ -114,7 +114,7 @@ impl Suite {
         Self::from_toml(&stem, name, &text, path.parent().unwrap_or(Path::new(".")))
     }
 
-    /// Reads a suite from TOML. `file` is what errors call it; scene paths are
+    /// Reads a suite from TOML. `name` is its name unless the TOML gives one; `file` is what errors call it; scene paths are
     /// relative to `folder`.
     ///
     /// # Errors
@@ -123,6 +123,10 @@ impl Suite {
         let parsed: SuiteFile =
             toml::from_str(text).map_err(|e| SuiteError::Toml { file: file.to_owned(), source: Box::new(e) })?;
         let invalid = |message: String| SuiteError::Invalid { file: file.to_owned(), message };
+        if let Some(name) = &parsed.name {
+            aogauge_scenes::check_name(name).map_err(|e| invalid(format!("name: {e}")))?;
+        }
+        let name = parsed.name.as_deref().unwrap_or(name);
         let mut scenes: Vec<Scene> = Vec::with_capacity(parsed.scenes.len());
         for scene in &parsed.scenes {
             let scene = if scene.ends_with(".toml") {
@@ -244,10 +248,19 @@ mod tests {
     }
 
     #[test]
+    fn a_file_may_name_its_suite() {
+        assert_eq!(with("").unwrap().name, "x");
+        assert_eq!(with("name = 'screen-space'").unwrap().name, "screen-space");
+    }
+
+    #[test]
     fn what_is_wrong_is_named() {
         assert!(with("").is_ok());
         for (extra, says) in [
             ("colour = 1", "colour"),
+            ("name = ''", "name: '' is not a legal name"),
+            ("name = '../x'", "name: '../x' is not a legal name"),
+            ("name = 'a # b'", "legal name"),
             ("golden_rays = 0", "line 6"),
             ("golden_rays = 5", "not among rays"),
             ("judge = { precision = 0 }", "line 6"),
