@@ -372,6 +372,40 @@ fn a_report_can_be_made_again() {
     assert!(again.join("report.md").exists());
 }
 
+/// The maps of a report show the record's own numbers, and the report bears the name
+/// that its suite gives itself.
+#[test]
+fn error_maps_show_what_the_record_holds() {
+    let (dir, suite) = folder(&scene(|s| s), &format!("name = \"curtains\"\n{}", suite("")));
+    let out = dir.path().join("out");
+    run(&suite, &out, 0, &[]);
+    assert!(fs::read_to_string(out.join("report.md")).unwrap().starts_with("# curtains: PASS"));
+    let record = record(&out);
+    assert_eq!(record["suite"]["name"], "curtains");
+    let transect = record["scenes"][0]["transect"].as_array().unwrap();
+    let first = transect.iter().position(|t| t.as_f64().unwrap().abs() <= 1.04).unwrap();
+    let layers = |name: &str| aogauge::layers::Layers::read(&out.join("images/scene").join(name)).unwrap();
+    let (regions, judge, case) = (layers("regions.exr"), layers("judge.exr"), layers("extended.cpu.4.exr"));
+    let (converged, mean) = (regions.get("converged-extended").unwrap(), case.get("mean").unwrap());
+    let (q, se) = (judge.get("q").unwrap(), judge.get("q-relative-se").unwrap());
+    let width = transect.len();
+    let mut valued = 0;
+    for (map, limit) in [("minus-q", 0.5), ("minus-converged", 0.1)] {
+        let scale = aogauge::picture::scale::Scale::signed(limit).unwrap();
+        let picture = image::open(out.join(format!("pictures/scene/{map}/extended.png"))).unwrap().into_rgb8();
+        for (x, y, pixel) in picture.enumerate_pixels() {
+            let i = y as usize / 4 * width + first + x as usize / 4;
+            let error = if map == "minus-q" { converged[i] - q[i] } else { mean[i] - converged[i] };
+            let noisy = map == "minus-q" && !(se[i] <= 0.05);
+            let color = scale.color(f64::from(error)).filter(|_| !noisy);
+            valued += usize::from(color.is_some());
+            let checker = aogauge::picture::color_bar::no_value([x, y], 2);
+            assert_eq!(pixel.0, color.unwrap_or(checker), "{map} {x} {y}: {error}");
+        }
+    }
+    assert!(valued > 1000, "{valued}");
+}
+
 #[test]
 fn a_record_of_another_version_is_refused() {
     let (dir, suite) = folder(&scene(|s| s), &suite(""));
