@@ -396,7 +396,7 @@ fn error_maps_show_what_the_record_holds() {
         for (x, y, pixel) in picture.enumerate_pixels() {
             let i = y as usize / 4 * width + first + x as usize / 4;
             let error = if map == "minus-q" { converged[i] - q[i] } else { mean[i] - converged[i] };
-            let noisy = map == "minus-q" && !(se[i] <= 0.05);
+            let noisy = map == "minus-q" && (se[i].is_nan() || se[i] > 0.05);
             let color = scale.color(f64::from(error)).filter(|_| !noisy);
             valued += usize::from(color.is_some());
             let checker = aogauge::picture::color_bar::no_value([x, y], 2);
