@@ -5,7 +5,7 @@
 //! pictures of docs/metrics.md there and prints its table.
 
 use aogauge::{
-    layers::{srgb, write_png},
+    layers::write_png,
     metrics::{
         artifact::Brighter,
         image::{Encoding, Image, Maps, Options, Pair, ScoreName, Scores, scores},
@@ -93,7 +93,12 @@ const DISTORTIONS: [Distortion; 7] = [
         most: 3.0,
         at: |s, i, a| s.extended[i].powf(1.0 + a),
     },
-    Distortion { name: "noise", cause: "too few rays", most: 1.0, at: |s, i, a| s.extended[i] + a * (uniform(i) - 0.5) },
+    Distortion {
+        name: "noise",
+        cause: "too few rays",
+        most: 1.0,
+        at: |s, i, a| s.extended[i] + a * (uniform(i) - 0.5),
+    },
     Distortion {
         name: "outliers",
         cause: "missed hits",
@@ -154,7 +159,9 @@ fn picture(seen: &Seen, values: &[f32], path: &Path) -> Result<(), Box<dyn Error
     let [width, height] = seen.size().map(|n| n as u32);
     let shown = image::RgbImage::from_fn(width * 2, height * 2, |x, y| {
         let v = values[(y / 2 * width + x / 2) as usize];
-        image::Rgb([srgb(if v.is_finite() { v } else { 0.0 }); 3])
+        // The values themselves: openness is near 1 almost everywhere, and the sRGB
+        // curve would leave little to see.
+        image::Rgb([(v.clamp(0.0, 1.0) * 255.0).round() as u8; 3])
     });
     Ok(write_png(path, &shown)?)
 }
@@ -209,7 +216,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let names: Vec<ScoreName> = rows[0].1.scores.iter().map(|s| s.name).collect();
     let mut text = String::from("| |");
     for (distortion, ..) in &rows {
-        text += &format!(" {}, {} |", distortion.name, distortion.cause);
+        text += &format!(" **{}**: {} |", distortion.name, distortion.cause);
     }
     text += &format!("\n|---|{}", "--:|".repeat(rows.len()));
     for name in names {

@@ -2,8 +2,13 @@
 
 use super::{Exit, Failure, Format, json, print, tell};
 use crate::{
-    metrics::image::{DEFAULT_PPD, Encoding, Image, NonFinite, Options, Pair, Scores, scores},
-    picture::read::read,
+    layers::write_png,
+    metrics::image::{DEFAULT_PPD, Encoding, Image, ImageError, Maps, NonFinite, Options, Pair, Scores, scores},
+    picture::{
+        error_map::{self, Caption, ErrorMap, MapError},
+        read::read,
+        scale::Scale,
+    },
 };
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
@@ -12,6 +17,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  aogauge compare reference.png test.png\n  \
 aogauge compare reference.exr test.exr --layer mean --mask footprint.png\n  \
+aogauge compare reference.png test.png --maps maps\n  \
 aogauge compare reference.hdr test.hdr --hdr --format json\n\n\
 OpenEXR, PNG, JPEG, Radiance HDR and TIFF. docs/metrics.md tells what each metric sees and misses.")]
 pub struct Args {
@@ -37,6 +43,12 @@ pub struct Args {
     /// SSIMULACRA2 too. It costs several times the rest.
     #[arg(long)]
     ssimulacra2: bool,
+    /// Folder for error maps: pictures with their scale, and maps.exr with the numbers.
+    #[arg(long)]
+    maps: Option<PathBuf>,
+    /// Where the scales of the absolute and the signed map end.
+    #[arg(long, default_value_t = 0.25, requires = "maps")]
+    scale: f64,
     /// What is printed on standard output.
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -67,12 +79,14 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     let reference = read(&args.reference, layer, encoding)?;
     let test = read(&args.test, layer, encoding)?;
     let mask = args.mask.as_deref().map(read_mask).transpose()?;
-    let between = |e: crate::metrics::image::ImageError| {
-        Failure::usage(format!("{} and {}: {e}", args.reference.display(), args.test.display()))
-    };
+    let between =
+        |e: ImageError| Failure::usage(format!("{} and {}: {e}", args.reference.display(), args.test.display()));
     let pair = Pair::new(&reference.image, &test.image, mask.as_deref()).map_err(between)?;
     let options = Options { ppd: args.ppd, hdr: args.hdr, exposures: None, ssimulacra2: args.ssimulacra2 };
-    let (found, _) = scores(&pair, &options).map_err(between)?;
+    let (found, maps) = scores(&pair, &options).map_err(between)?;
+    if let Some(folder) = &args.maps {
+        write_maps(folder, found.size, maps, args.scale)?;
+    }
     match args.format {
         Format::Text => print(&table(&found))?,
         Format::Json => print(&json(&found)?)?,
@@ -92,6 +106,34 @@ fn read_mask(path: &Path) -> Result<Vec<f32>, Failure> {
     let planes = image.planes();
     let weight = |i: usize| planes.iter().map(|p| p[i]).sum::<f32>() / planes.len() as f32;
     Ok((0..image.pixels()).map(weight).collect())
+}
+
+/// Writes a picture a map, and all maps as layers.
+fn write_maps(folder: &Path, size: [usize; 2], maps: Maps, scale: f64) -> Result<(), Failure> {
+    let wrong = |e: MapError| Failure::usage(e.to_string());
+    let size = size.map(|n| n as u32);
+    let mut drawn = Vec::new();
+    for (name, values, scale) in [
+        ("absolute", maps.absolute, Scale::absolute(scale)),
+        ("signed", maps.signed, Scale::signed(scale)),
+        ("ssim", maps.ssim, Scale::similarity(0.0)),
+        ("flip", maps.flip, Ok(Scale::flip())),
+        ("hdr-flip", maps.hdr_flip, Ok(Scale::flip())),
+    ] {
+        if !values.is_empty() {
+            drawn.push((name, ErrorMap::new(size, values, scale.map_err(wrong)?).map_err(wrong)?));
+        }
+    }
+    for (name, map) in &drawn {
+        let title = match *name {
+            "absolute" => "|test - reference|",
+            "signed" => "test - reference",
+            other => other,
+        };
+        write_png(&folder.join(format!("{name}.png")), &map.picture(&Caption { title, unit: "" }))?;
+    }
+    let all = error_map::layers(drawn.iter().map(|(name, map)| (*name, map))).map_err(wrong)?;
+    Ok(all.write(&folder.join("maps.exr"))?)
 }
 
 fn table(found: &Scores) -> String {

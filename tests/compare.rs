@@ -1,0 +1,125 @@
+//! `aogauge compare`, from outside.
+
+#![allow(missing_docs, clippy::unwrap_used)]
+
+use aogauge::layers::Layers;
+use image::{Luma, Rgb, RgbImage};
+use serde_json::Value;
+use std::{
+    path::Path,
+    process::{Command, Output},
+};
+
+fn compare(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_aogauge")).current_dir(folder).arg("compare").args(args).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+fn json(output: &Output) -> Value {
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn value(scores: &Value, name: &str) -> f64 {
+    scores["scores"].as_array().unwrap().iter().find(|s| s["name"] == name).unwrap()["value"].as_f64().unwrap()
+}
+
+/// Two pictures that differ by 0.2 in the left half.
+fn pictures(folder: &Path) {
+    let picture = |left: u8| RgbImage::from_fn(40, 30, |x, _| Rgb([if x < 20 { left } else { 102 }; 3]));
+    picture(102).save(folder.join("a.png")).unwrap();
+    picture(153).save(folder.join("b.png")).unwrap();
+}
+
+#[test]
+fn every_metric_is_printed_and_masks_weigh() {
+    let folder = tempfile::tempdir().unwrap();
+    pictures(folder.path());
+    let out = compare(folder.path(), &["a.png", "b.png"]);
+    let table = text(&out.stdout);
+    for name in ["mean-error", "mae", "mse", "rmse", "psnr", "relative-mse", "smape", "ssim", "ms-ssim", "flip"] {
+        assert!(table.lines().any(|l| l.starts_with(name)), "{name}: {table}");
+    }
+    assert!(table.contains("40 x 30 pixels, 3 channels, srgb"), "{table}");
+    assert!(table.contains("the shorter side is 30, it must be 176 pixels or more for MS-SSIM"), "{table}");
+    let scores = json(&compare(folder.path(), &["a.png", "b.png", "--format", "json"]));
+    assert!((value(&scores, "mae") - 0.1).abs() < 1e-7 && (value(&scores, "psnr") - 16.9897).abs() < 1e-4);
+
+    image::GrayImage::from_fn(40, 30, |x, _| Luma([if x < 10 { 255 } else { 0 }]))
+        .save(folder.path().join("m.png"))
+        .unwrap();
+    let masked = json(&compare(folder.path(), &["a.png", "b.png", "--mask", "m.png", "--format", "json"]));
+    assert!((value(&masked, "mae") - 0.2).abs() < 1e-7);
+    assert_eq!(masked["weight"], 300.0);
+}
+
+#[test]
+fn what_the_numbers_stand_for_decides_flip_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    pictures(folder.path());
+    let codes = json(&compare(folder.path(), &["a.png", "b.png", "--format", "json"]));
+    let linear = json(&compare(folder.path(), &["a.png", "b.png", "--encoding", "linear", "--format", "json"]));
+    assert_eq!(value(&codes, "ssim"), value(&linear, "ssim"));
+    assert!((value(&codes, "flip") - value(&linear, "flip")).abs() > 0.01);
+    assert_eq!((codes["encoding"].as_str(), linear["encoding"].as_str()), (Some("srgb"), Some("linear")));
+}
+
+#[test]
+fn maps_are_pictures_and_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    pictures(folder.path());
+    let out = compare(folder.path(), &["a.png", "b.png", "--maps", "maps", "--encoding", "linear", "--hdr"]);
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+    for name in ["absolute", "signed", "ssim", "flip", "hdr-flip"] {
+        let picture = image::open(folder.path().join(format!("maps/{name}.png"))).unwrap();
+        assert!(picture.width() >= 480 && picture.height() > 300, "{name}");
+    }
+    let maps = Layers::read(&folder.path().join("maps/maps.exr")).unwrap();
+    assert_eq!(maps.layers.keys().collect::<Vec<_>>(), ["absolute", "flip", "hdr-flip", "signed", "ssim"]);
+    let signed = maps.get("signed").unwrap();
+    assert!((signed[0] - 0.2).abs() < 1e-6 && signed[39] == 0.0);
+    assert!(maps.get("ssim").unwrap()[0].is_nan());
+    assert_eq!(maps.attributes["signed.to"], "0.25");
+}
+
+#[test]
+fn nan_is_counted_and_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, values: Vec<f32>| {
+        Layers::new([4, 1]).with("mean", values).write(&folder.path().join(name)).unwrap()
+    };
+    write("a.exr", vec![0.5, f32::NAN, 0.5, f32::NAN]);
+    write("b.exr", vec![0.5, f32::NAN, f32::INFINITY, 0.25]);
+    let out = compare(folder.path(), &["a.exr", "b.exr", "--format", "json"]);
+    let scores = json(&out);
+    assert_eq!(scores["non_finite"], serde_json::json!({ "reference": 1, "test": 1, "both": 1 }));
+    assert_eq!((value(&scores, "mae"), scores["weight"].as_f64()), (0.0, Some(1.0)));
+    assert!(text(&out.stderr).contains("1 pixels of the reference alone, 1 of the test image alone and 1 of both"));
+}
+
+#[test]
+fn mistakes_end_with_2_and_a_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    pictures(folder.path());
+    RgbImage::new(8, 9).save(folder.path().join("small.png")).unwrap();
+    image::GrayImage::new(40, 30).save(folder.path().join("grey.png")).unwrap();
+    std::fs::write(folder.path().join("words.png"), "words").unwrap();
+    for (args, message) in [
+        (&["a.png", "none.png"][..], "none.png: cannot read the image"),
+        (&["a.png", "words.png"], "words.png: not a readable image"),
+        (&["a.png", "small.png"], "40 x 30 pixels, the test image 8 x 9"),
+        (&["a.png", "grey.png"], "the reference has 3, the test image 1"),
+        (&["a.png", "b.png", "--mask", "small.png"], "the mask has 72 values, the images have 1200 pixels"),
+        (&["a.png", "b.png", "--mask", "grey.png"], "1200 are masked"),
+        (&["a.png", "b.png", "--ppd", "0"], "pixels per degree is 0, it must be 1 to 1000"),
+        (&["a.png", "b.png", "--layer", "mean"], "only OpenEXR images have layers"),
+        (&["a.png", "b.png", "--maps", "m", "--scale=-1"], "scale"),
+    ] {
+        let out = compare(folder.path(), args);
+        assert_eq!(out.status.code(), Some(2), "{args:?}");
+        assert!(text(&out.stderr).contains(message), "{args:?}: {}", text(&out.stderr));
+    }
+}
