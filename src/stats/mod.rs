@@ -3,16 +3,39 @@
 //! Distributions come from statrs; tails use the survival function, never
 //! `1 - cdf`, so that small p-values keep their digits.
 
+mod bootstrap;
+mod chi_square;
+mod directions;
+mod equivalence;
 mod jackknife;
+mod moments;
+mod multiplicity;
+mod regression;
+mod scales;
+mod share;
 mod spread;
-mod tests_of_means;
+mod student;
+mod uniformity;
+mod welch;
 
+pub use bootstrap::{Bca, bca, bca_levels};
+pub use chi_square::{ChiSquare, ChiSquareError, LEAST_EXPECTED, chi_square};
+pub use directions::DirectionHistogram;
+pub use equivalence::{Better, non_inferior, tost};
 pub use jackknife::{Group, jackknife};
+pub use moments::Moments;
+pub use multiplicity::{benjamini_hochberg, holm, sidak, sidak_alpha};
+pub use regression::{Line, RegressionError, log_log_slope, regress};
+pub use scales::{
+    Difference, ImageSample, IndependentPixels, POWER, Replicates, Scale, ScaleTest, TILE, pixel_p_values, three_scales,
+};
+pub use share::{clopper_pearson, wilson};
 pub use spread::Spread;
-pub(crate) use tests_of_means::welch_of_moments;
-pub use tests_of_means::{Welch, sidak_alpha, tost, welch};
+pub use student::{Student, student, student_pooled};
+pub use uniformity::{Uniformity, uniformity};
+pub use welch::{Welch, welch, welch_of_estimates};
 
-use statrs::distribution::{ContinuousCDF, StudentsT};
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 /// A value with its standard error and the degrees of freedom of that error.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,7 +115,7 @@ impl Estimate {
 }
 
 /// Student's distribution, or None where `df` is no positive number.
-fn student(df: f64) -> Option<StudentsT> {
+fn students_t(df: f64) -> Option<StudentsT> {
     StudentsT::new(0.0, 1.0, df).ok()
 }
 
@@ -102,12 +125,39 @@ pub fn quantile(df: f64, p: f64) -> f64 {
     if !(0.0..=1.0).contains(&p) {
         return f64::NAN;
     }
-    student(df).map_or(f64::NAN, |d| d.inverse_cdf(p))
+    students_t(df).map_or(f64::NAN, |d| d.inverse_cdf(p))
 }
 
-/// P(T > t) of Student's t; NaN where `df` is no positive number.
+/// Quantile of the standard normal distribution; NaN where `p` lies outside [0, 1].
+fn normal_quantile(p: f64) -> f64 {
+    if (0.0..=1.0).contains(&p) { Normal::standard().inverse_cdf(p) } else { f64::NAN }
+}
+
+/// P(T > t) of Student's t; NaN where `df` is no positive number or `t` is NaN.
 pub fn upper_tail(df: f64, t: f64) -> f64 {
-    student(df).map_or(f64::NAN, |d| d.sf(t))
+    if t.is_nan() {
+        return f64::NAN;
+    }
+    students_t(df).map_or(f64::NAN, |d| d.sf(t))
+}
+
+/// The oracle values of the tests of this room.
+#[cfg(test)]
+mod reference {
+    use serde_json::Value;
+
+    pub fn reference() -> Value {
+        serde_json::from_str(include_str!("../../tests/reference/statistics.json")).unwrap()
+    }
+
+    pub fn numbers(v: &Value) -> Vec<f64> {
+        v.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+    }
+
+    pub fn close(a: f64, b: &Value, what: &str) {
+        let b = b.as_f64().unwrap();
+        assert!((a - b).abs() <= 1e-9 * b.abs().max(1e-3), "{what}: {a} against {b}");
+    }
 }
 
 #[cfg(test)]
