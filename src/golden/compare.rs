@@ -3,13 +3,9 @@
 use super::Sampled;
 use crate::{
     layers::pixel_hash,
-    stats::{quantile, sidak_alpha, welch_of_moments},
+    stats::{Difference, IndependentPixels, Scale, ScaleTest, three_scales},
 };
 use serde::Serialize;
-
-/// Edge of a tile, pixels. Single pixels have no power (a shift of .48 would
-/// pass), the whole image no place; 16 x 16 tiles at 16 replicates see .023.
-pub const TILE: u32 = 16;
 
 /// A tile's bias that must be found with probability .8, or a comparison says
 /// nothing.
@@ -19,18 +15,8 @@ pub const MUST_SEE: f64 = 0.05;
 /// share of all. It is what the GPU is allowed against the CPU.
 const SAME_RAYS: f64 = 1e-4;
 
-/// A test of one tile, or of the whole image.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Tile {
-    /// Left, top, width and height in pixels.
-    pub place: [u32; 4],
-    /// Mean of the image less mean of the golden.
-    pub bias: f64,
-    /// Standard error of the bias.
-    pub se: f64,
-    /// Two-sided p-value.
-    pub p: f64,
-}
+/// Rejections that a comparison names; the rest are counted.
+const NAMED: usize = 64;
 
 /// What a comparison found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -47,8 +33,8 @@ pub enum Finding {
         /// Their share, at least.
         share: f64,
     },
-    /// The tests that reject, the surest first.
-    Shifted(Vec<Tile>),
+    /// The tests that reject, the surest first, 64 at most.
+    Shifted(Vec<Difference>),
     /// Pixels that hold a number on one side only: geometry moved, or NaN.
     Structure {
         /// How many.
@@ -70,6 +56,23 @@ pub struct Comparison {
     pub detectable: f64,
     /// Tests made.
     pub tests: usize,
+    /// What each scale could see and how many of its tests reject, from pixels to the
+    /// whole image.
+    pub scales: Vec<Seen>,
+}
+
+/// What the tests of one scale could see.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Seen {
+    /// The scale.
+    pub scale: Scale,
+    /// Tests made.
+    pub tests: usize,
+    /// Tests that reject.
+    pub rejected: usize,
+    /// The bias that would be found with probability .8, in the median place; null
+    /// where errors are unknown.
+    pub detectable: f64,
 }
 
 impl Comparison {
@@ -102,7 +105,8 @@ impl Comparison {
                     let [x, y, w, h] = t.place;
                     format!("; surest at {x},{y} ({w}x{h}): {:+.4}, p = {:.1e}", t.bias, t.p)
                 });
-                format!("DIFFERENT  {} of {} tests reject{worst}; mean bias {:+.5}", tiles.len(), self.tests, self.bias)
+                let rejected: usize = self.scales.iter().map(|s| s.rejected).sum();
+                format!("DIFFERENT  {rejected} of {} tests reject{worst}; mean bias {:+.5}", self.tests, self.bias)
             }
         }
     }
@@ -110,33 +114,14 @@ impl Comparison {
 
 /// Compares an image with its golden, both of the same resolution.
 ///
-/// The exact hash comes first, where the golden's seeds were used; if it differs,
-/// no more than 1 ray in 10,000 may. With fresh seeds, Welch's test, with both variances, on every
-/// 16 x 16 tile and on the whole image: the variance of a mean over pixels is the
-/// sum of the pixels' variances over (pixels^2 x replicates), because pixels have
-/// random numbers of their own. Tiles without any noise would reject on one ray,
-/// so the variance of a tile's mean is never below (1 / its rays)^2. The level is
-/// Sidak's for all tests of `family` cases.
+/// The exact hash comes first, where the golden's seeds were used; if it differs, no
+/// more than 1 ray in 10,000 may. With fresh seeds, [`three_scales`]: pixels have
+/// random numbers of their own, so they are independent. The level is Sidak's for
+/// `family` cases.
 pub fn compare(golden: &Sampled, image: &Sampled, alpha: f64, family: usize) -> Comparison {
     let same_seeds = golden.seed == image.seed && golden.replicates == image.replicates && golden.rays == image.rays;
     let structure = golden.mean.iter().zip(&image.mean).filter(|(a, b)| a.is_finite() != b.is_finite()).count();
-    let [width, height] = golden.resolution;
-    let whole = [0, 0, width, height];
-    let tiles: Vec<[u32; 4]> = (0..height)
-        .step_by(TILE as usize)
-        .flat_map(|y| (0..width).step_by(TILE as usize).map(move |x| [x, y, TILE.min(width - x), TILE.min(height - y)]))
-        .chain([whole])
-        .collect();
-    let level = sidak_alpha(alpha, tiles.len() * family.max(1));
-    let tests: Vec<(Tile, f64)> = tiles.iter().filter_map(|&place| test(golden, image, place)).collect();
-    let mut rejected: Vec<Tile> = tests.iter().map(|(t, _)| *t).filter(|t| t.p < level || t.p.is_nan()).collect();
-    rejected.sort_by(|a, b| a.p.total_cmp(&b.p));
-    let mut detectable: Vec<f64> = tests
-        .iter()
-        .filter(|(t, _)| t.place != whole)
-        .map(|(t, df)| t.se * (quantile(*df, 1.0 - level / 2.0) + quantile(*df, 0.8)))
-        .collect();
-    detectable.sort_by(f64::total_cmp);
+    let scales = three_scales(golden.resolution, &pixels(image), &pixels(golden), alpha, family);
     let finding = if same_seeds && pixel_hash(&golden.mean) == pixel_hash(&image.mean) {
         Finding::Identical
     } else if structure > 0 {
@@ -144,18 +129,52 @@ pub fn compare(golden: &Sampled, image: &Sampled, alpha: f64, family: usize) -> 
     } else if same_seeds {
         let share = rays_moved(golden, image);
         if share <= SAME_RAYS { Finding::Equal } else { Finding::Rays { share } }
-    } else if rejected.is_empty() {
+    } else if scales.iter().all(|s| s.rejected.is_empty()) {
         Finding::Equal
     } else {
-        Finding::Shifted(rejected)
+        Finding::Shifted(surest(&scales))
     };
+    let detectable = scales.iter().find(|s| s.scale == Scale::Tile).map_or(0.0, |s| s.detectable);
     Comparison {
         finding,
         same_seeds,
-        bias: tests.iter().find(|(t, _)| t.place == whole).map_or(0.0, |(t, _)| t.bias),
-        detectable: detectable.get(detectable.len() / 2).copied().unwrap_or(0.0),
-        tests: tests.len(),
+        bias: bias(golden, image),
+        detectable,
+        tests: scales.iter().map(|s| s.tests).sum(),
+        scales: scales
+            .iter()
+            .map(|s| Seen { scale: s.scale, tests: s.tests, rejected: s.rejected.len(), detectable: s.detectable })
+            .collect(),
     }
+}
+
+fn pixels(image: &Sampled) -> IndependentPixels<'_> {
+    IndependentPixels {
+        mean: &image.mean,
+        variance: &image.variance,
+        replicates: image.replicates,
+        quantum: 1.0 / f64::from(image.rays.max(1)),
+    }
+}
+
+/// Rejections of all scales, the surest first; of equal ones the larger place.
+fn surest(scales: &[ScaleTest; 3]) -> Vec<Difference> {
+    let mut all: Vec<Difference> = scales.iter().rev().flat_map(|s| s.rejected.iter().copied()).collect();
+    all.sort_by(|a, b| a.p.total_cmp(&b.p));
+    all.truncate(NAMED);
+    all
+}
+
+/// Mean of the image less mean of the golden, over pixels known in both; 0 of none.
+fn bias(golden: &Sampled, image: &Sampled) -> f64 {
+    let differences: Vec<f64> = image
+        .mean
+        .iter()
+        .zip(&golden.mean)
+        .map(|(a, b)| f64::from(*a) - f64::from(*b))
+        .filter(|d| d.is_finite())
+        .collect();
+    differences.iter().sum::<f64>() / differences.len().max(1) as f64
 }
 
 /// The least share of rays that explains the difference of the means.
@@ -163,38 +182,6 @@ fn rays_moved(golden: &Sampled, image: &Sampled) -> f64 {
     let pairs = || golden.mean.iter().zip(&image.mean).filter(|(a, b)| a.is_finite() && b.is_finite());
     let moved: f64 = pairs().map(|(a, b)| f64::from((a - b).abs())).sum();
     moved / pairs().count() as f64
-}
-
-/// Mean, variance of that mean and its degrees of freedom over a rectangle; None
-/// where it holds no number.
-fn moments(image: &Sampled, [x, y, w, h]: [u32; 4]) -> Option<(f64, f64, f64)> {
-    let (mut n, mut sum, mut variance, mut squares) = (0.0, 0.0, 0.0, 0.0);
-    for row in y..y + h {
-        for column in x..x + w {
-            let i = (row * image.resolution[0] + column) as usize;
-            if image.mean[i].is_finite() {
-                let v = f64::from(image.variance[i]);
-                n += 1.0;
-                sum += f64::from(image.mean[i]);
-                variance += v;
-                squares += v * v;
-            }
-        }
-    }
-    if n == 0.0 {
-        return None;
-    }
-    let replicates = f64::from(image.replicates);
-    let floor = (n * replicates * f64::from(image.rays)).powi(-2);
-    // Welch and Satterthwaite over the pixels.
-    let df = if squares > 0.0 { variance * variance * (replicates - 1.0) / squares } else { n * (replicates - 1.0) };
-    Some((sum / n, (variance / (n * n * replicates)).max(floor), df))
-}
-
-fn test(golden: &Sampled, image: &Sampled, place: [u32; 4]) -> Option<(Tile, f64)> {
-    let welch = welch_of_moments(moments(image, place)?, moments(golden, place)?);
-    let d = welch.difference;
-    Some((Tile { place, bias: d.value, se: d.se, p: welch.p_two }, d.df))
 }
 
 #[cfg(test)]

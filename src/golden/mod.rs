@@ -7,7 +7,7 @@
 
 mod compare;
 
-pub use compare::{Comparison, Finding, Tile, compare};
+pub use compare::{Comparison, Finding, Seen, compare};
 
 use crate::{
     disk::DiskError,

@@ -7,7 +7,7 @@ use super::{Estimate, mean_variance};
 /// must not.
 pub type Group = Vec<Vec<f64>>;
 
-fn column_means(rows: &Group) -> Vec<f64> {
+pub(super) fn column_means(rows: &Group) -> Vec<f64> {
     let n = rows.len() as f64;
     (0..rows.first().map_or(0, Vec::len)).map(|c| rows.iter().map(|r| r[c]).sum::<f64>() / n).collect()
 }
@@ -31,20 +31,28 @@ pub fn jackknife(groups: &[Group], f: impl Fn(&[Vec<f64>]) -> f64) -> Estimate {
     let (mut variance, mut welch) = (0.0, 0.0);
     for (g, rows) in groups.iter().enumerate() {
         let n = rows.len() as f64;
-        let whole = means[g].clone();
-        let left_out: Vec<f64> = rows
-            .iter()
-            .map(|row| {
-                means[g] = whole.iter().zip(row).map(|(m, v)| (m * n - v) / (n - 1.0)).collect();
-                f(&means)
-            })
-            .collect();
-        means[g] = whole;
+        let left_out = left_out(rows, g, &mut means, &f);
         let v = mean_variance(&left_out).1 * (n - 1.0).powi(2) / n;
         variance += v;
         welch += v * v / (n - 1.0);
     }
     Estimate { value, se: variance.sqrt(), df: if welch > 0.0 { variance * variance / welch } else { 1.0 } }
+}
+
+/// `f` with each row of group `g` left out in turn. `means` are those of all groups,
+/// and are so again afterwards.
+pub(super) fn left_out(rows: &Group, g: usize, means: &mut [Vec<f64>], f: &impl Fn(&[Vec<f64>]) -> f64) -> Vec<f64> {
+    let n = rows.len() as f64;
+    let whole = means[g].clone();
+    let values = rows
+        .iter()
+        .map(|row| {
+            means[g] = whole.iter().zip(row).map(|(m, v)| (m * n - v) / (n - 1.0)).collect();
+            f(means)
+        })
+        .collect();
+    means[g] = whole;
+    values
 }
 
 #[cfg(test)]

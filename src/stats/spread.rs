@@ -30,14 +30,9 @@ impl Spread {
     pub fn of(values: &[f64]) -> Option<Spread> {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
-        let last = sorted.len().checked_sub(1)?;
-        let at = |share: f64| {
-            let place = share * last as f64;
-            let (below, part) = (place.floor(), place.fract());
-            let above = (below as usize + 1).min(last);
-            sorted[below as usize] * (1.0 - part) + sorted[above] * part
-        };
-        Some(Spread { least: sorted[0], lower: at(0.25), median: at(0.5), upper: at(0.75) })
+        let least = *sorted.first()?;
+        let [lower, median, upper] = [0.25, 0.5, 0.75].map(|share| quantile_of_sorted(&sorted, share));
+        Some(Spread { least, lower, median, upper })
     }
 
     /// Each value by a factor above 0.
@@ -46,4 +41,15 @@ impl Spread {
         let Spread { least, lower, median, upper } = self;
         Spread { least: least * factor, lower: lower * factor, median: median * factor, upper: upper * factor }
     }
+}
+
+/// Quantile (type 7 of Hyndman and Fan 1996) of values in order, at a share in [0,
+/// 1]; NaN of none.
+pub(super) fn quantile_of_sorted(sorted: &[f64], share: f64) -> f64 {
+    let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
+    let place = share * last as f64;
+    let (below, part) = ((place.floor() as usize).min(last), place.fract());
+    let [low, high] = [sorted[below], sorted[(below + 1).min(last)]];
+    // Infinite neighbours must not make NaN where the value is one of them.
+    if part == 0.0 { low } else { low * (1.0 - part) + high * part }
 }
