@@ -1,6 +1,6 @@
 //! `aogauge compare`, from outside.
 
-#![allow(missing_docs, clippy::unwrap_used)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
 
 use aogauge::layers::Layers;
 use image::{Luma, Rgb, RgbImage};
@@ -122,4 +122,43 @@ fn mistakes_end_with_2_and_a_sentence() {
         assert_eq!(out.status.code(), Some(2), "{args:?}");
         assert!(text(&out.stderr).contains(message), "{args:?}: {}", text(&out.stderr));
     }
+}
+
+/// 8 replicates of 40 x 30 pixels of noise, and `bias` in one tile.
+fn record_image(path: &Path, seed: u32, bias: f32) {
+    let mut x = seed;
+    let mut layers = Layers::new([40, 30]);
+    let mut mean = vec![0.0; 1200];
+    for replicate in 0..8 {
+        let image: Vec<f32> = (0..1200)
+            .map(|i| {
+                x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                let noise = (x >> 8) as f32 / 16_777_216.0 * 0.2;
+                0.5 + noise + if i % 40 < 16 && i / 40 < 16 { bias } else { 0.0 }
+            })
+            .collect();
+        mean.iter_mut().zip(&image).for_each(|(m, v)| *m += v / 8.0);
+        layers = layers.with(&format!("replicate-{replicate:04}"), image);
+    }
+    layers.with("mean", mean).write(path).unwrap();
+}
+
+#[test]
+fn replicates_are_tested_at_three_scales() {
+    let folder = tempfile::tempdir().unwrap();
+    record_image(&folder.path().join("a.exr"), 1, 0.0);
+    record_image(&folder.path().join("same.exr"), 2, 0.0);
+    record_image(&folder.path().join("brighter.exr"), 3, 0.05);
+    let rejected = |test: &str| -> Vec<usize> {
+        let found = json(&compare(folder.path(), &["a.exr", test, "--format", "json", "--maps", "maps"]));
+        found["welch"].as_array().unwrap().iter().map(|s| s["rejected"].as_array().unwrap().len()).collect()
+    };
+    assert_eq!(rejected("same.exr"), [0, 0, 0]);
+    let [_, tiles, image] = rejected("brighter.exr")[..] else { panic!("three scales") };
+    assert_eq!((tiles, image), (1, 1));
+    let maps = Layers::read(&folder.path().join("maps/maps.exr")).unwrap();
+    assert!(maps.get("p-value").unwrap().iter().all(|p| (0.0..=1.0).contains(p)));
+    let table = text(&compare(folder.path(), &["a.exr", "brighter.exr"]).stdout);
+    assert!(table.contains("surest at 0, 0 (16 x 16): bias +0.0"), "{table}");
+    assert!(table.contains("would have been found"), "{table}");
 }
