@@ -1,6 +1,11 @@
 //! Intervals of functions of means whose distribution is skew: the BCa bootstrap.
 
-use super::{Group, jackknife::column_means, normal_quantile, spread::quantile_of_sorted};
+use super::{
+    Group,
+    jackknife::{column_means, left_out},
+    normal_quantile,
+    spread::quantile_of_sorted,
+};
 use crate::render::sampler::{combine, hash};
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -91,8 +96,8 @@ fn bias_correction(values: &[f64], value: f64) -> f64 {
 fn acceleration(groups: &[Group], f: &impl Fn(&[Vec<f64>]) -> f64) -> f64 {
     let mut means: Vec<Vec<f64>> = groups.iter().map(column_means).collect();
     let (mut squares, mut cubes) = (0.0, 0.0);
-    for g in 0..groups.len() {
-        let left_out = super::jackknife::left_out(&groups[g], g, &mut means, f);
+    for (g, rows) in groups.iter().enumerate() {
+        let left_out = left_out(rows, g, &mut means, f);
         let n = left_out.len() as f64;
         if n < 2.0 {
             continue;

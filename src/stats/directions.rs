@@ -51,8 +51,7 @@ impl DirectionHistogram {
     pub fn add(&mut self, direction: Vec3) {
         let d = direction.as_dvec3().normalize();
         let [x, y, cosine] = self.frame.map(|axis| axis.dot(d));
-        // NaN is not above the horizon either.
-        if !(cosine > -ROUNDING) {
+        if cosine.is_nan() || cosine <= -ROUNDING {
             self.outside += 1;
             return;
         }

@@ -213,9 +213,9 @@ fn of_scale(scale: Scale, tests: &[([u32; 4], Estimate)], level: f64) -> ScaleTe
     let bound = -normal_quantile(level / 2.0);
     let mut rejected: Vec<Difference> = tests
         .iter()
-        .filter(|(_, bias)| !(bias.value.abs() < bound * bias.se))
+        .filter(|(_, bias)| bias.value.abs() >= bound * bias.se || bias.value.is_nan() || bias.se.is_nan())
         .map(|(place, bias)| Difference { place: *place, bias: bias.value, se: bias.se, p: tails(bias, 0.0)[1] })
-        .filter(|d| !(d.p >= level))
+        .filter(|d| d.p < level || d.p.is_nan())
         .collect();
     rejected.sort_by(|a, b| {
         let size = |d: &Difference| (d.bias / d.se).abs();
