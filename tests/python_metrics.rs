@@ -56,7 +56,8 @@ fn bright(state: u32) -> f32 {
 fn pair(case: &Value, encoding: Encoding) -> [Image; 2] {
     if let Some(files) = case["files"].as_array() {
         let file = |name: &Value| {
-            let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/reference/images/").to_owned() + name.as_str().unwrap();
+            let path =
+                concat!(env!("CARGO_MANIFEST_DIR"), "/tests/reference/images/").to_owned() + name.as_str().unwrap();
             read(path.as_ref(), None, Some(encoding)).unwrap().image
         };
         return [file(&files[0]), file(&files[1])];

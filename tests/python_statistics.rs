@@ -6,8 +6,9 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
 
 use aogauge::stats::{
-    Better, Estimate, Group, Moments, Spread, bca, benjamini_hochberg, chi_square, clopper_pearson, holm, mean_variance,
-    non_inferior, quantile, regress, sidak, student, student_pooled, tost, uniformity, upper_tail, welch, wilson,
+    Better, Estimate, Group, Moments, Spread, bca, benjamini_hochberg, chi_square, clopper_pearson, holm,
+    mean_variance, non_inferior, quantile, regress, sidak, student, student_pooled, tost, uniformity, upper_tail,
+    welch, wilson,
 };
 use serde_json::Value;
 
@@ -42,7 +43,12 @@ fn within(ours: f64, theirs: &Value, tolerance: f64, what: impl std::fmt::Displa
     let theirs = theirs.as_f64().unwrap();
     // A whole ulp, so that a tolerance of nothing is not asked of rounding.
     let tolerance = tolerance.max(2.0 * f64::EPSILON * theirs.abs());
-    if std::env::var("ALL").is_ok() { if !((ours - theirs).abs() <= tolerance) { eprintln!("MISS {what}: {ours:e}, theirs {theirs:e} rel {:.1e}", (ours/theirs-1.0).abs()); } return; }
+    if std::env::var("ALL").is_ok() {
+        if !((ours - theirs).abs() <= tolerance) {
+            eprintln!("MISS {what}: {ours:e}, theirs {theirs:e} rel {:.1e}", (ours / theirs - 1.0).abs());
+        }
+        return;
+    }
     assert!((ours - theirs).abs() <= tolerance, "{what}: {ours:e}, theirs {theirs:e}");
 }
 
@@ -95,7 +101,8 @@ fn t_tests() {
         let against = row["against"].as_f64().unwrap_or(0.0);
         // Estimate of what is tested, t, p two-sided, p of greater, and p of less by
         // turning the question round.
-        let of_student = |test: aogauge::stats::Student, less: f64| (test.difference, test.t, test.p_two, test.p_greater, less);
+        let of_student =
+            |test: aogauge::stats::Student, less: f64| (test.difference, test.t, test.p_two, test.p_greater, less);
         let (difference, t, p_two, p_greater, p_less) = match row["kind"].as_str().unwrap() {
             "one" => of_student(student(&a, against), student(&negative(&a), -against).p_greater),
             "paired" => of_student(student(&less(&a, &b()), 0.0), student(&less(&b(), &a), 0.0).p_greater),
@@ -214,7 +221,12 @@ fn students_distribution() {
         let df = row["df"].as_f64().unwrap();
         for (i, p) in numbers(&row["levels"]).into_iter().enumerate() {
             let theirs = &row["quantiles"][i];
-            within(quantile(df, p), theirs, TOLERANCE * theirs.as_f64().unwrap().abs().max(1e-6), format_args!("t({p}, {df})"));
+            within(
+                quantile(df, p),
+                theirs,
+                TOLERANCE * theirs.as_f64().unwrap().abs().max(1e-6),
+                format_args!("t({p}, {df})"),
+            );
         }
         for (i, t) in numbers(&row["t"]).into_iter().enumerate() {
             close(upper_tail(df, t), &row["upper_tails"][i], format_args!("tail of {t}, {df}"));

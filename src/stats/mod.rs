@@ -144,7 +144,11 @@ fn where_tail_is(d: &StudentsT, tail: f64) -> f64 {
     let mut t = if guess > 0.0 && guess.is_finite() { guess } else { 1.0 };
     for _ in 0..100 {
         let above = d.sf(t);
-        if above > tail { low = t } else { high = t }
+        if above > tail {
+            low = t
+        } else {
+            high = t
+        }
         let step = t * ((above / tail).ln() * above / (d.pdf(t) * t)).exp();
         let next = match (step > low && step < high, high.is_finite()) {
             (true, _) => step,
