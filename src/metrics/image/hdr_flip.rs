@@ -17,6 +17,10 @@ const ACES: [f64; 6] = [0.36 * 2.51, 0.6 * 0.03, 0.0, 0.36 * 2.43, 0.6 * 0.59, 0
 /// and the median pixel.
 const SHOWN_AT: f64 = 0.85;
 
+/// What a median below is taken for, as in FLIP 1.7: half of a reference may be
+/// black.
+const LEAST_MEDIAN: f32 = f32::EPSILON;
+
 /// More exposures than this would show nothing new: 2^32 is beyond any renderer.
 const MAX_EXPOSURES: u32 = 64;
 
@@ -26,7 +30,8 @@ const MAX_EXPOSURES: u32 = 64;
 pub struct Exposures {
     /// The first, at which the reference's brightest pixel is shown at 0.85.
     pub start: f64,
-    /// The last, at which its median pixel is.
+    /// The last, at which its median pixel is; of an even number of pixels, the
+    /// brighter one in the middle.
     pub stop: f64,
     /// How many, evenly apart, 2 to 64.
     pub count: u32,
@@ -43,7 +48,7 @@ pub struct HdrFlip {
 
 impl Exposures {
     /// The exposures that the paper derives from a linear reference; None where it
-    /// is too dark for it (a median or maximum of zero).
+    /// is black (a maximum of zero). A median below 2^-23 counts as 2^-23.
     pub fn of(pair: &Pair<'_>) -> Option<Exposures> {
         let image = pair.reference();
         let planes = image.planes();
@@ -60,7 +65,7 @@ impl Exposures {
         let [a, b, c] = [0, 1, 2].map(|i| ACES[i] - SHOWN_AT * ACES[i + 3]);
         let half = -0.5 * b / a;
         let shown = half + (half * half - c / a).sqrt();
-        let [start, stop] = [brightest, median].map(|v| (shown / f64::from(v)).log2());
+        let [start, stop] = [brightest, median.max(LEAST_MEDIAN)].map(|v| (shown / f64::from(v)).log2());
         let count = (stop - start).ceil().clamp(2.0, f64::from(MAX_EXPOSURES)) as u32;
         (start.is_finite() && stop.is_finite()).then_some(Exposures { start, stop, count })
     }

@@ -224,7 +224,7 @@ pub fn scores(pair: &Pair<'_>, options: &Options) -> Result<(Scores, Maps), Imag
     all.push(score(ScoreName::Flip, mean("flip", "no pixel has weight")));
     if options.hdr {
         let why = if image.encoding() == Encoding::Linear {
-            "the reference is too dark: its median or its maximum is 0"
+            "the reference is black"
         } else {
             "HDR-FLIP needs linear images"
         };
