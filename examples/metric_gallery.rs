@@ -208,7 +208,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         let amount = distortion.amount(&look);
         let image = distortion.image(&look, amount);
         let test = grey(&look, &image)?;
-        let (found, maps) = scores(&Pair::new(&reference, &test, None)?, &Options::default())?;
+        let (found, maps) =
+            scores(&Pair::new(&reference, &test, None)?, &Options { ssimulacra2: true, ..Options::default() })?;
         write_pictures(&look, distortion.name, &image, maps, out)?;
         let under = distortion.image(&measure, amount);
         rows.push((distortion, found, contrast_error(&regions, &measure, &under)?));
