@@ -89,7 +89,7 @@ fn maps_are_pictures_and_numbers() {
 fn nan_is_counted_and_told() {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, values: Vec<f32>| {
-        Layers::new([4, 1]).with("mean", values).write(&folder.path().join(name)).unwrap()
+        Layers::new([4, 1]).with("mean", values).write(&folder.path().join(name)).unwrap();
     };
     write("a.exr", vec![0.5, f32::NAN, 0.5, f32::NAN]);
     write("b.exr", vec![0.5, f32::NAN, f32::INFINITY, 0.25]);
