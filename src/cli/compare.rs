@@ -222,13 +222,14 @@ fn table(found: &Scores) -> String {
         let why = score.note.as_deref().unwrap_or_else(|| score.name.reading());
         text += &format!("{:<14} {value:>12}   {why}\n", score.name.label());
     }
-    text += &format!("\n{:<14} {:>10} {:>10} {:>10} {:>10}  at\n", "map", "median", "95 %", "99 %", "max");
-    for (name, map) in &found.maps {
-        let [x, y] = map.max_at;
-        text += &format!(
-            "{name:<14} {:>10.6} {:>10.6} {:>10.6} {:>10.6}  {x}, {y}\n",
-            map.median, map.p95, map.p99, map.max
-        );
+    text += &format!("\n{:<14} {:>10} {:>10} {:>10} {:>10}  at\n", "map", "median", "worst 5 %", "worst 1 %", "worst");
+    for (name, m) in &found.maps {
+        // Of SSIM the lowest values are the worst.
+        let (five, one, worst, [x, y]) = match name.as_str() {
+            "ssim" => (m.p5, m.p1, m.min, m.min_at),
+            _ => (m.p95, m.p99, m.max, m.max_at),
+        };
+        text += &format!("{name:<14} {:>10.6} {five:>10.6} {one:>10.6} {worst:>10.6}  {x}, {y}\n", m.median);
     }
     text
 }

@@ -17,13 +17,19 @@ pub struct MapSummary {
     pub mean: f64,
     /// The smallest value.
     pub min: f64,
+    /// Column and row of the first pixel that has it.
+    pub min_at: [usize; 2],
     /// The largest value.
     pub max: f64,
     /// Column and row of the first pixel that has it.
     pub max_at: [usize; 2],
-    /// The smallest value that half of the weight does not exceed.
+    /// The smallest value that 1 % of the weight does not exceed.
+    pub p1: f64,
+    /// The same for 5 %.
+    pub p5: f64,
+    /// The same for half of the weight.
     pub median: f64,
-    /// The same for 95 % of the weight.
+    /// The same for 95 %.
     pub p95: f64,
     /// The same for 99 %.
     pub p99: f64,
@@ -48,12 +54,16 @@ pub fn summary(pair: &Pair<'_>, map: &[f32]) -> Option<MapSummary> {
     if total.weight <= 0.0 {
         return None;
     }
-    let [median, p95, p99] = percentiles(pair, map, [0.5, 0.95, 0.99], total.weight);
+    let [p1, p5, median, p95, p99] = percentiles(pair, map, [0.01, 0.05, 0.5, 0.95, 0.99], total.weight);
+    let place = |pixel: usize| [pixel % width, pixel / width];
     Some(MapSummary {
         mean: total.sum / total.weight,
         min: f64::from(total.min),
+        min_at: place(total.min_at),
         max: f64::from(total.max),
-        max_at: [total.max_at % width, total.max_at / width],
+        max_at: place(total.max_at),
+        p1,
+        p5,
         median,
         p95,
         p99,
@@ -65,13 +75,14 @@ struct Total {
     weight: f64,
     sum: f64,
     min: f32,
+    min_at: usize,
     max: f32,
     max_at: usize,
 }
 
 impl Default for Total {
     fn default() -> Self {
-        Total { weight: 0.0, sum: 0.0, min: f32::INFINITY, max: f32::NEG_INFINITY, max_at: 0 }
+        Total { weight: 0.0, sum: 0.0, min: f32::INFINITY, min_at: 0, max: f32::NEG_INFINITY, max_at: 0 }
     }
 }
 
@@ -80,7 +91,9 @@ impl Total {
         if weight > 0.0 && !value.is_nan() {
             self.weight += weight;
             self.sum += weight * f64::from(value);
-            self.min = self.min.min(value);
+            if value < self.min {
+                (self.min, self.min_at) = (value, at);
+            }
             if value > self.max {
                 (self.max, self.max_at) = (value, at);
             }
@@ -89,10 +102,12 @@ impl Total {
 
     fn and(&self, later: &Total) -> Total {
         let max = if later.max > self.max { later } else { self };
+        let min = if later.min < self.min { later } else { self };
         Total {
             weight: self.weight + later.weight,
             sum: self.sum + later.sum,
-            min: self.min.min(later.min),
+            min: min.min,
+            min_at: min.min_at,
             max: max.max,
             max_at: max.max_at,
         }
@@ -109,41 +124,45 @@ fn value(key: u32) -> f32 {
     f32::from_bits(if key >> 31 == 1 { key & !(1 << 31) } else { !key })
 }
 
+/// Bins of a histogram over half a key.
+const BINS: usize = 1 << 16;
+
 /// Exact weighted percentiles without sorting or copying: a histogram of the upper
-/// half of the keys, then one of the lower half in each bin that is asked for.
-/// Sorting 8 million values took four times as long as the FLIP map itself.
+/// halves of the keys, then one of the lower halves in each bin that is asked for.
 fn percentiles<const N: usize>(pair: &Pair<'_>, map: &[f32], shares: [f64; N], total: f64) -> [f64; N] {
-    let histogram = |keep: &(dyn Fn(u32) -> Option<usize> + Sync)| -> Vec<f64> {
-        // A few large parts: a histogram is half a megabyte.
-        let part = map.len().div_ceil(8).max(CHUNK);
-        let parts: Vec<Vec<f64>> = map
-            .par_chunks(part)
-            .enumerate()
-            .map(|(index, values)| {
-                let mut bins = vec![0.0; 1 << 16];
-                for (i, &v) in values.iter().enumerate().filter(|(_, v)| !v.is_nan()) {
-                    if let Some(bin) = keep(key(v)) {
-                        bins[bin] += pair.weight(index * part + i);
-                    }
-                }
-                bins
-            })
-            .collect();
-        let mut parts = parts.into_iter();
-        let mut sum = parts.next().unwrap_or_default();
-        for other in parts {
-            sum.iter_mut().zip(other).for_each(|(a, b)| *a += b);
-        }
-        sum
-    };
-    let upper = histogram(&|key| Some((key >> 16) as usize));
-    shares.map(|share| {
-        let wanted = share * total;
-        let (high, before) = reach(&upper, wanted);
-        let lower = histogram(&|key| ((key >> 16) as usize == high).then_some((key & 0xffff) as usize));
-        let (low, _) = reach(&lower, wanted - before);
+    let upper = histogram(pair, map, BINS, |key| Some((key >> 16) as usize));
+    let reached = shares.map(|share| reach(&upper, share * total));
+    let slot = |high: usize| reached.iter().position(|&(h, _)| h == high);
+    let lower =
+        histogram(pair, map, N * BINS, |key| Some(slot((key >> 16) as usize)? * BINS + (key & 0xffff) as usize));
+    std::array::from_fn(|i| {
+        let (high, before) = reached[i];
+        let at = slot(high).unwrap_or(i) * BINS;
+        let (low, _) = reach(&lower[at..at + BINS], shares[i] * total - before);
         f64::from(value((high as u32) << 16 | low as u32))
     })
+}
+
+/// The weight in each bin; `bin` tells which one a key is in.
+fn histogram(pair: &Pair<'_>, map: &[f32], bins: usize, bin: impl Fn(u32) -> Option<usize> + Sync) -> Vec<f64> {
+    // A few large parts, as many on every machine: a histogram is half a megabyte
+    // and more.
+    let part = map.len().div_ceil(4).max(CHUNK);
+    let parts = map.par_chunks(part).enumerate().map(|(index, values)| {
+        let mut weights = vec![0.0; bins];
+        for (i, &v) in values.iter().enumerate().filter(|(_, v)| !v.is_nan()) {
+            if let Some(bin) = bin(key(v)) {
+                weights[bin] += pair.weight(index * part + i);
+            }
+        }
+        weights
+    });
+    let mut parts = parts.collect::<Vec<Vec<f64>>>().into_iter();
+    let mut sum = parts.next().unwrap_or_else(|| vec![0.0; bins]);
+    for other in parts {
+        sum.iter_mut().zip(other).for_each(|(a, b)| *a += b);
+    }
+    sum
 }
 
 /// The first bin at which the running sum reaches `wanted` (the last that holds
@@ -173,8 +192,8 @@ mod tests {
         let map = [0.1, 0.2, 0.9, 7.0, f32::NAN, -0.3, 0.0, 0.2];
         let s = summary(&pair, &map).unwrap();
         assert!((s.mean - (0.1 + 0.2 + 0.45 - 0.3 + 0.2) / 5.5).abs() < 1e-7);
-        assert_eq!((s.min as f32, s.max as f32, s.max_at), (-0.3, 0.9, [2, 0]));
-        assert_eq!((s.median as f32, s.p95 as f32), (0.1, 0.9));
+        assert_eq!((s.min as f32, s.min_at, s.max as f32, s.max_at), (-0.3, [1, 1], 0.9, [2, 0]));
+        assert_eq!((s.p1 as f32, s.median as f32, s.p95 as f32), (-0.3, 0.1, 0.9));
         assert!(summary(&pair, &[f32::NAN; 8]).is_none());
     }
 
@@ -192,7 +211,7 @@ mod tests {
         let s = summary(&Pair::new(&image, &image, None).unwrap(), &map).unwrap();
         map.sort_by(f32::total_cmp);
         let at = |share: f64| f64::from(map[(share * n as f64).ceil() as usize - 1]);
-        assert_eq!([s.median, s.p95, s.p99], [at(0.5), at(0.95), at(0.99)]);
+        assert_eq!([s.p1, s.p5, s.median, s.p95, s.p99], [0.01, 0.05, 0.5, 0.95, 0.99].map(at));
         assert_eq!([s.min, s.max], [f64::from(map[0]), f64::from(map[n - 1])]);
     }
 }
