@@ -145,9 +145,9 @@ fn where_tail_is(d: &StudentsT, tail: f64) -> f64 {
     for _ in 0..100 {
         let above = d.sf(t);
         if above > tail {
-            low = t
+            low = t;
         } else {
-            high = t
+            high = t;
         }
         let step = t * ((above / tail).ln() * above / (d.pdf(t) * t)).exp();
         let next = match (step > low && step < high, high.is_finite()) {
