@@ -99,8 +99,8 @@ fn pair(case: &Value, encoding: Encoding) -> [Image; 2] {
     }
     let mut test = vec![Vec::new(); channels];
     for i in 0..width * height {
-        for (c, plane) in test.iter_mut().enumerate() {
-            let r = reference[c][i];
+        for (c, (plane, reference)) in test.iter_mut().zip(&reference).enumerate() {
+            let r = reference[i];
             plane.push(match kind {
                 "random" => draws.unit(),
                 "near" => 0.999 * r,
