@@ -581,16 +581,12 @@ def differences(old, new, where=""):
         yield where, math.nan
 
 
-def best(command, runs=5):
-    """Wall time and CPU time (user and system) of the run with the least wall time, and what it printed."""
-    found = []
-    for _ in range(runs):
-        before, start = os.times(), time.perf_counter()
-        text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-        wall, after = time.perf_counter() - start, os.times()
-        cpu = after.children_user - before.children_user + after.children_system - before.children_system
-        found.append((wall, cpu, text))
-    return min(found)
+def run(command):
+    """Wall time, CPU time (user and system), and what was printed."""
+    before, start = os.times(), time.perf_counter()
+    text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    wall, after = time.perf_counter() - start, os.times()
+    return wall, after.children_user - before.children_user + after.children_system - before.children_system, text
 
 
 def timed(program):
@@ -614,12 +610,14 @@ def timed(program):
             "aogauge compare, all metrics, all maps": [*ours, "--maps", str(folder / "maps")],
         }
         print(f"\ntwo PNGs of {width} x {height}, {os.cpu_count()} processors, best of 5 runs")
-        for name, command in commands.items():
-            wall, cpu, _ = best(command)
+        # By turns, so that what else the machine does falls on all.
+        runs = [[run(command)[:2] for command in commands.values()] for _ in range(5)]
+        for name, found in zip(commands, zip(*runs)):
+            wall, cpu = min(found)
             print(f"{name:40} {wall:6.2f} s, of the processors {cpu:6.2f} s")
         r, t = (flip_evaluator.load(path) for path in paths)
         mean = flip_evaluator.evaluate(r, t, "LDR", True, False, False, {"ppd": PPD})[0].astype(np.float64).mean()
-        scores = json.loads(best([*ours, "--format", "json"], 1)[2])["scores"]
+        scores = json.loads(run([*ours, "--format", "json"])[2])["scores"]
         found = next(s["value"] for s in scores if s["name"] == "flip")
         # Its tool prints a running sum in f32, which is no mean at this size.
         print(f"mean FLIP: aogauge {found:.7f}, flip-evaluator's map {mean:.7f}")
@@ -646,7 +644,8 @@ def main():
     print("  ".join(f"{k} {v}" for k, v in values["versions"].items()))
     worst = {}
     for where, difference in differences({k: old[k] for k in ("images", "statistics")}, {k: values[k] for k in ("images", "statistics")}):
-        part = "/".join(where.split("/")[1:3]) if where.startswith("/statistics") else "images/" + where.split("/")[3]
+        _, whole, name, *rest = where.split("/")
+        part = f"{whole}/{name}" if whole == "statistics" else f"{whole}/{rest[0] if rest[0] in DEFINITIONS else 'recipe'}"
         count, most, place = worst.get(part, (0, 0.0, ""))
         # NaN, a change of form, is worse than anything.
         worse = not difference <= most and not math.isnan(most)
