@@ -3,7 +3,7 @@
 use super::Sampled;
 use crate::{
     layers::pixel_hash,
-    stats::{quantile, sidak_alpha, welch_of_moments},
+    stats::{Estimate, sidak_alpha, welch_of_moments},
 };
 use serde::Serialize;
 
@@ -134,7 +134,7 @@ pub fn compare(golden: &Sampled, image: &Sampled, alpha: f64, family: usize) -> 
     let mut detectable: Vec<f64> = tests
         .iter()
         .filter(|(t, _)| t.place != whole)
-        .map(|(t, df)| t.se * (quantile(*df, 1.0 - level / 2.0) + quantile(*df, 0.8)))
+        .map(|(t, df)| Estimate { value: t.bias, se: t.se, df: *df }.detectable(level, 0.8))
         .collect();
     detectable.sort_by(f64::total_cmp);
     let finding = if same_seeds && pixel_hash(&golden.mean) == pixel_hash(&image.mean) {
