@@ -2,10 +2,13 @@
 //! report can be made again from a record at any time.
 
 pub mod bench;
+mod convergence;
 pub mod flatland;
 mod markdown;
+mod occluders;
 pub(crate) mod picture;
 mod plot;
+mod pooled;
 pub mod table;
 
 use crate::{

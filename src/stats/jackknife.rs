@@ -28,19 +28,34 @@ fn column_means(rows: &Group) -> Vec<f64> {
 pub fn jackknife(groups: &[Group], f: impl Fn(&[Vec<f64>]) -> f64) -> Estimate {
     let mut means: Vec<Vec<f64>> = groups.iter().map(column_means).collect();
     let value = f(&means);
-    let (mut variance, mut welch) = (0.0, 0.0);
+    let mut left_out: Vec<Vec<f64>> = Vec::with_capacity(groups.len());
     for (g, rows) in groups.iter().enumerate() {
         let n = rows.len() as f64;
         let whole = means[g].clone();
-        let left_out: Vec<f64> = rows
-            .iter()
-            .map(|row| {
-                means[g] = whole.iter().zip(row).map(|(m, v)| (m * n - v) / (n - 1.0)).collect();
-                f(&means)
-            })
-            .collect();
+        let without = rows.iter().map(|row| {
+            means[g] = whole.iter().zip(row).map(|(m, v)| (m * n - v) / (n - 1.0)).collect();
+            f(&means)
+        });
+        left_out.push(without.collect());
         means[g] = whole;
-        let v = mean_variance(&left_out).1 * (n - 1.0).powi(2) / n;
+    }
+    jackknife_of(value, &left_out)
+}
+
+/// The same for any statistic: `value` is that of all replicates, `left_out` holds
+/// for each group its values with one replicate of that group left out.
+///
+/// ```
+/// use aogauge::stats::jackknife_of;
+/// // The mean of 1, 2 and 6.
+/// let e = jackknife_of(3.0, &[vec![4.0, 3.5, 1.5]]);
+/// assert!((e.se - (7.0f64 / 3.0).sqrt()).abs() < 1e-12 && e.df == 2.0);
+/// ```
+pub fn jackknife_of(value: f64, left_out: &[Vec<f64>]) -> Estimate {
+    let (mut variance, mut welch) = (0.0, 0.0);
+    for values in left_out {
+        let n = values.len() as f64;
+        let v = mean_variance(values).1 * (n - 1.0).powi(2) / n;
         variance += v;
         welch += v * v / (n - 1.0);
     }

@@ -7,7 +7,7 @@ mod jackknife;
 mod spread;
 mod tests_of_means;
 
-pub use jackknife::{Group, jackknife};
+pub use jackknife::{Group, jackknife, jackknife_of};
 pub use spread::Spread;
 pub(crate) use tests_of_means::welch_of_moments;
 pub use tests_of_means::{Welch, sidak_alpha, tost, welch};
