@@ -47,7 +47,7 @@ pub struct Pooled {
     /// better.
     pub rmse: Pool,
     /// Mean over control scenes, each with the same weight, of the mean of
-    /// O(classic) - O. 0 is right.
+    /// O(classic) - O. 0 is right. Null for classic itself.
     pub over_darkening: Pool,
 }
 
@@ -121,7 +121,7 @@ impl Row<'_> {
             bias: under(MetricName::Bias).mean(),
             mae: under(MetricName::Mae).mean(),
             rmse: under(MetricName::Rmse).root_mean_square(),
-            over_darkening: self.terms(true, |_, c| Ok((value(c, MetricName::OverDarkening, None)?, 1.0))).mean(),
+            over_darkening: self.over_darkening(),
         }
     }
 
@@ -178,10 +178,21 @@ impl Row<'_> {
         })
     }
 
+    /// For classic itself: nothing is compared with it.
+    fn of_classic(&self) -> Option<Pool> {
+        let why = || Absent("classic is what the others are compared with".into());
+        let is = self.key.0 == self.suite.classic;
+        is.then(|| Pool { pooled: Quantity::new(Err(why())), scenes: vec![], left_out: vec![] })
+    }
+
+    fn over_darkening(&self) -> Pool {
+        let of = |_: &SceneRecord, c: &CaseRecord| Ok((value(c, MetricName::OverDarkening, None)?, 1.0));
+        self.of_classic().unwrap_or_else(|| self.terms(true, of).mean())
+    }
+
     fn removed(&self) -> Pool {
-        if self.key.0 == self.suite.classic {
-            let why = Absent("classic is what the others are compared with".into());
-            return Pool { pooled: Quantity::new(Err(why)), scenes: vec![], left_out: vec![] };
+        if let Some(none) = self.of_classic() {
+            return none;
         }
         let mut classic = Vec::new();
         let mut terms = self.terms(false, |_, c| Ok((value(c, MetricName::ContrastError, None)?, 1.0)));

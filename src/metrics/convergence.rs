@@ -237,7 +237,7 @@ fn model(rays: &[f64], mse: &[f64]) -> [f64; 2] {
 /// Intercept and slope of a line through points (x, y, weight).
 fn line(points: &[(f64, f64, f64)]) -> [f64; 2] {
     let sum = |f: fn(&(f64, f64, f64)) -> f64| points.iter().map(f).sum::<f64>();
-    let weight = sum(|(_, _, w)| w);
+    let weight = sum(|(_, _, w)| *w);
     let (x, y) = (sum(|(x, _, w)| w * x) / weight, sum(|(_, y, w)| w * y) / weight);
     let across = points.iter().map(|(px, py, w)| w * (px - x) * (py - y)).sum::<f64>();
     let along = points.iter().map(|(px, _, w)| w * (px - x).powi(2)).sum::<f64>();

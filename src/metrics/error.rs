@@ -60,7 +60,8 @@ pub fn against_converged(method: &Method<'_>, region: Region) -> [Metric; 3] {
 /// The physical error of a region: mean openness less the region's Q, and mean
 /// absolute value and root mean square of O - Q over the pixels whose Q is not
 /// masked. Of one replicate each, as against the converged image; the noise of Q's
-/// image, below 5 % of Q a pixel, is part of the last two.
+/// image, below 5 % of Q a pixel, is part of the last two. Where many pixels are masked, these
+/// two speak of the others only, and may come out below the bias.
 pub fn against_judge(
     method: &Method<'_>,
     q: Result<Estimate, Absent>,

@@ -76,10 +76,10 @@ impl Occluder {
         &self,
         method: &Method<'_>,
         classic: Option<&Method<'_>>,
-        judged: Result<&JudgedOccluder, Absent>,
-        image: Result<&QImage, Absent>,
+        judged: &Result<&JudgedOccluder, Absent>,
+        image: &Result<&QImage, Absent>,
     ) -> OccluderMetrics {
-        let metrics = case_metrics::of_occluder(method, classic, &judged, &image);
+        let metrics = case_metrics::of_occluder(method, classic, judged, image);
         OccluderMetrics { name: self.name.clone(), metrics }
     }
 }

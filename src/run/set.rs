@@ -297,7 +297,7 @@ impl<'a> Set<'a> {
             let judge = judged
                 .clone()
                 .and_then(|j| j.occluder(i, on_screen).ok_or_else(|| Absent("the occluder was not judged".into())));
-            occluder.metrics(&own, classic(regions).as_ref(), judge, image.clone())
+            occluder.metrics(&own, classic(regions).as_ref(), &judge, &image)
         };
         self.occluders.iter().enumerate().map(of).collect()
     }
