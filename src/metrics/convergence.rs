@@ -138,7 +138,12 @@ pub fn convergence(
         renderer: renderer.to_owned(),
         region,
         points: points.collect(),
-        slope: of(&|m| slope(&rays, &mse(m)), 2),
+        slope: match &found {
+            Ok(sample) if sample.whole.iter().any(|m| m.mse() <= 0.0) => {
+                Quantity::new(Err(Absent("the error is zero at a ray count, so it has no slope".into())))
+            }
+            _ => of(&|m| slope(&rays, &mse(m)), 2),
+        },
         limit: of(&|m| model(&rays, &mse(m))[0], 3),
         per_ray: of(&|m| model(&rays, &mse(m))[1], 3),
     }
@@ -359,6 +364,7 @@ mod tests {
         let pixels: Vec<u32> = (0..64).collect();
         let exact = convergence(["e", "cpu"], Region::All, levels.clone(), &still, Ok(&pixels));
         assert_eq!((exact.points[1].rmse.value, exact.slope.value), (Some(0.0), None));
+        assert!(exact.slope.note.as_deref().unwrap().contains("the error is zero"));
         let none = convergence(["e", "cpu"], Region::All, levels, &still, Err(Absent("too small".into())));
         assert_eq!(none.points[0].rmse.note.as_deref(), Some("too small"));
     }
