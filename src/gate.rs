@@ -6,7 +6,7 @@
 
 use crate::{
     metrics::{Metric, MetricName, regions::Region},
-    stats::tost,
+    stats::{Estimate, tost},
     suite::Case,
 };
 use schemars::JsonSchema;
@@ -15,6 +15,9 @@ use serde::{Deserialize, Serialize};
 /// Confidence of the intervals that verdicts are taken on; equivalence is tested
 /// at alpha = 1 - confidence.
 pub const CONFIDENCE: f64 = 0.95;
+
+/// Probability with which an effect as small as [`Verdict::detectable`] is decided.
+pub const POWER: f64 = 0.8;
 
 /// What a value must satisfy.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -97,6 +100,12 @@ pub struct Verdict {
     pub limit: Limit,
     /// The 95 % interval; null where the metric is.
     pub interval: Option<[f64; 2]>,
+    /// The smallest detectable effect, in the metric's unit: how far on the right side
+    /// of the limit the truth must lie to be decided with a probability of 0.8 (see
+    /// [`Gate::verdict`]). A pass says little where that is larger than what matters.
+    /// Null where the metric is.
+    #[serde(default)]
+    pub detectable: Option<f64>,
     /// p-value of the equivalence test, for `equals`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub p: Option<f64>,
@@ -122,6 +131,20 @@ impl Gate {
     /// Whether the gate holds for this scene's judge.
     pub fn applies_to_judge(&self, scene: &str) -> bool {
         self.metric == MetricName::JudgeContrast && (self.scenes.is_empty() || self.scenes.iter().any(|s| s == scene))
+    }
+
+    /// The smallest distance of the truth from the limit that would be decided with
+    /// a probability of [`POWER`]. One-sided limits are held against the two-sided
+    /// interval of [`CONFIDENCE`], so by its quantile t(0.975): a truth so far within
+    /// the limit passes, one so far outside fails. Equivalence is tested on either
+    /// side at 1 - `CONFIDENCE`, by t(0.95): a truth so far within the nearer edge of
+    /// the margin passes, where the other edge is further away.
+    fn detectable(&self, estimate: Estimate) -> Option<f64> {
+        let alpha = match self.limit {
+            Limit::AtLeast(_) | Limit::AtMost(_) => 1.0 - CONFIDENCE,
+            Limit::Equals { .. } => 2.0 * (1.0 - CONFIDENCE),
+        };
+        Some(estimate.detectable(alpha, POWER)).filter(|d| d.is_finite())
     }
 
     /// Judges one metric.
@@ -166,6 +189,7 @@ impl Gate {
             metric: metric.clone(),
             limit: self.limit,
             interval: interval.filter(|i| i.iter().all(|v| v.is_finite())),
+            detectable: estimate.and_then(|e| self.detectable(e)),
             p,
             outcome,
             reason,
@@ -176,7 +200,6 @@ impl Gate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stats::Estimate;
 
     fn gate(limit: Limit, known_failure: Option<&str>) -> Gate {
         Gate {

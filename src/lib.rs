@@ -11,6 +11,7 @@ pub mod kit;
 pub mod layers;
 pub mod metrics;
 pub mod picture;
+pub mod pooled;
 pub mod preview;
 pub mod record;
 pub mod render;

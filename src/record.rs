@@ -5,10 +5,15 @@
 //! what a killed run left behind. Everything that differs between two runs of the
 //! same suite and seed stands under `timing`.
 
+mod folder;
+
+pub use folder::RecordFolder;
+
 use crate::{
-    disk::{DiskError, read_text, write_whole},
+    disk::{DiskError, read_text},
     gate::{Outcome, Verdict},
-    metrics::{Metric, artifact::Brighter, profile::Curve, regions::Region},
+    metrics::{Metric, artifact::Brighter, convergence::Convergence, profile::Curve, regions::Region},
+    pooled::Pooled,
     scenes::check_name,
     suite::Case,
     suite::EstimatorFile,
@@ -17,12 +22,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::{
     collections::BTreeMap,
-    fs, io,
-    path::{Component, Path, PathBuf},
+    fs,
+    path::{Component, Path},
 };
 
 /// Version of the record's format. Readers refuse others.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 
 /// The file that makes a folder a record.
 pub const FILE: &str = "record.json";
@@ -50,6 +55,8 @@ pub struct Record {
     pub verdicts: Vec<Verdict>,
     /// Gates that held for no case of this run, with the reason.
     pub idle_gates: Vec<IdleGate>,
+    /// The scenes taken together, by estimator, renderer and rays.
+    pub pooled: Vec<Pooled>,
     /// The scenes.
     pub scenes: Vec<SceneRecord>,
     /// The cases.
@@ -134,11 +141,13 @@ pub struct Summary {
     pub cases: usize,
     /// Cases that ended with an error.
     pub failed_cases: usize,
+    /// Scenes whose judge failed.
+    pub failed_judges: usize,
 }
 
 impl Summary {
     /// Counts.
-    pub fn new(verdicts: &[Verdict], idle: &[IdleGate], cases: &[CaseRecord]) -> Self {
+    pub fn new(verdicts: &[Verdict], idle: &[IdleGate], scenes: &[SceneRecord], cases: &[CaseRecord]) -> Self {
         let count = |o: Outcome| verdicts.iter().filter(|v| v.outcome == o).count();
         Summary {
             pass: count(Outcome::Pass),
@@ -147,6 +156,7 @@ impl Summary {
             known_failures: count(Outcome::KnownFailure),
             cases: cases.len(),
             failed_cases: cases.iter().filter(|c| c.error.is_some()).count(),
+            failed_judges: scenes.iter().filter(|s| s.judge_error.is_some()).count(),
         }
     }
 }
@@ -199,6 +209,16 @@ pub struct SceneRecord {
     /// Why there is no judge.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub no_judge: Option<String>,
+    /// Why the judge failed; the run is incomplete then.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub judge_error: Option<String>,
+    /// The occluders one by one, in the order of the scene: those in view, where two
+    /// or more are.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub occluders: Vec<OccluderRecord>,
+    /// How the error of each method falls with its rays, over all pixels and over
+    /// the footprint.
+    pub convergence: Vec<Convergence>,
     /// Openness along the transect on the CPU at the most rays, and Q.
     pub profiles: Vec<Curve>,
     /// Region masks and converged images, relative to the record.
@@ -218,6 +238,42 @@ pub struct ScreenRecord {
     pub resolution: [u32; 2],
     /// Pixels of each region that it shows.
     pub regions: BTreeMap<Region, usize>,
+}
+
+/// One occluder object of several. Its regions are found with its triangles as the
+/// only sheet. They are judged by the scene's own twin, which lacks all occluders: Q
+/// is what all of them together do to the light there.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OccluderRecord {
+    /// The object.
+    pub name: String,
+    /// Pixels of footprint, left and right.
+    pub regions: BTreeMap<Region, usize>,
+    /// Those that the camera of screen-space methods shows.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub shown: Option<BTreeMap<Region, usize>>,
+    /// K(Q) of its regions.
+    pub contrast: Metric,
+    /// Q of footprint, left and right.
+    pub q: BTreeMap<Region, RegionQ>,
+}
+
+/// The metrics of a case under one occluder of several.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OccluderMetrics {
+    /// The object.
+    pub name: String,
+    /// Contrast and its error, openness, and errors over footprint and flanks.
+    pub metrics: Vec<Metric>,
+}
+
+impl OccluderMetrics {
+    /// A metric by name, and region where it has one.
+    pub fn metric(&self, name: crate::metrics::MetricName, region: Option<Region>) -> Option<&Metric> {
+        self.metrics.iter().find(|m| m.name == name && m.region == region)
+    }
 }
 
 /// What the judge found.
@@ -254,13 +310,16 @@ pub enum Stopped {
 }
 
 /// Q of a region.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RegionQ {
     /// The ratio of the region's mean irradiances.
     pub value: Option<f64>,
     /// Its 95 % interval.
     pub interval: Option<[f64; 2]>,
+    /// Why there is no value.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub note: Option<String>,
 }
 
 /// What was found in a case.
@@ -277,9 +336,24 @@ pub struct CaseRecord {
     pub hash: Option<String>,
     /// Its metrics.
     pub metrics: Vec<Metric>,
+    /// Its metrics by occluder, where the scene shows two or more.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub occluders: Vec<OccluderMetrics>,
 }
 
 impl CaseRecord {
+    /// A case that ended with an error.
+    pub fn failed(case: &Case, error: String) -> Self {
+        CaseRecord {
+            case: case.clone(),
+            error: Some(error),
+            image: None,
+            hash: None,
+            metrics: vec![],
+            occluders: vec![],
+        }
+    }
+
     /// A metric by name, and region where it has one.
     pub fn metric(&self, name: crate::metrics::MetricName, region: Option<Region>) -> Option<&Metric> {
         self.metrics.iter().find(|m| m.name == name && m.region == region)
@@ -367,87 +441,9 @@ impl Record {
         if s.failed_cases > 0 {
             line += &format!("; {} of {} cases ended with an error", s.failed_cases, s.cases);
         }
+        if s.failed_judges > 0 {
+            line += &format!("; the judge of {} scenes failed", s.failed_judges);
+        }
         line
     }
-}
-
-/// A folder that a run fills.
-#[derive(Debug)]
-pub struct RecordFolder {
-    path: PathBuf,
-}
-
-impl RecordFolder {
-    /// Makes an empty folder for a record. A record of that name is moved aside to
-    /// `NAME.previous` first, what a killed run left is removed; any other folder
-    /// that is not empty is refused.
-    ///
-    /// # Errors
-    /// Where the folder cannot be written, or holds something else.
-    pub fn create(path: &Path) -> Result<Self, DiskError> {
-        // Without a slash at its end, so that a name can be appended.
-        let path = &path.components().collect::<PathBuf>();
-        if path.file_name().is_none() {
-            return Err(DiskError::content(path, "name a folder for the record, not one that holds others"));
-        }
-        let occupied = match fs::read_dir(path) {
-            Ok(mut entries) => entries.next().is_some(),
-            Err(e) if e.kind() == io::ErrorKind::NotFound => false,
-            Err(e) => return Err(DiskError::io(path, "use this as the output folder")(e)),
-        };
-        if occupied {
-            if !path.join(FILE).exists() && !path.join(BEGUN).exists() {
-                return Err(DiskError::content(
-                    path,
-                    "the output folder holds files that are not a record: name another folder",
-                ));
-            }
-            if path.join(FILE).exists() {
-                move_aside(path)?;
-            } else {
-                // What a killed run left is worth less than the record before it.
-                fs::remove_dir_all(path).map_err(DiskError::io(path, "remove what an unfinished run left"))?;
-            }
-        }
-        fs::create_dir_all(path).map_err(DiskError::io(path, "create the output folder"))?;
-        write_whole(&path.join(BEGUN), |_| Ok(()))?;
-        Ok(RecordFolder { path: path.to_owned() })
-    }
-
-    /// Where it is.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// Writes `record.json`, which makes the folder a record.
-    ///
-    /// # Errors
-    /// Where it cannot be written.
-    pub fn commit(&self, record: &Record) -> Result<(), DiskError> {
-        let path = self.path.join(FILE);
-        let unfit = |e: serde_json::Error| DiskError::content(&path, format!("the record cannot be written: {e}"));
-        let text = serde_json::to_string_pretty(record).map_err(unfit)?;
-        // JSON has no NaN and no infinity: what could not be read must not look whole.
-        serde_json::from_str::<Record>(&text).map_err(unfit)?;
-        write_whole(&path, |buffer| io::Write::write_all(buffer, format!("{text}\n").as_bytes()))?;
-        let begun = self.path.join(BEGUN);
-        fs::remove_file(&begun).map_err(DiskError::io(&begun, "remove the mark of a running run"))
-    }
-}
-
-/// Moves a record to `NAME.previous`, in place of the record before.
-fn move_aside(path: &Path) -> Result<(), DiskError> {
-    let mut aside = path.as_os_str().to_owned();
-    aside.push(".previous");
-    let aside = PathBuf::from(aside);
-    if aside.exists() {
-        if !aside.join(FILE).exists() && !aside.join(BEGUN).exists() {
-            return Err(DiskError::content(
-                &aside,
-                "the older record cannot be moved here: the folder holds something else",
-            ));
-        }
-        fs::remove_dir_all(&aside).map_err(DiskError::io(&aside, "remove the record before last"))?;
-    }
-    fs::rename(path, &aside).map_err(DiskError::io(path, "move the older record aside"))
 }

@@ -413,7 +413,7 @@ fn a_record_of_another_version_is_refused() {
     run(&suite, &out, 0, &[]);
     let path = out.join("record.json");
     let current = fs::read_to_string(&path).unwrap();
-    let newer = current.replacen("\"version\": 2", "\"version\": 99", 1);
+    let newer = current.replacen("\"version\": 3", "\"version\": 99", 1);
     assert_ne!(current, newer);
     fs::write(&path, newer).unwrap();
     assert!(expect(2, &["report", text(&out)]).contains("version 99"));

@@ -168,7 +168,7 @@ fn open(args: &Args) -> Result<(Option<Result<Gpu, RenderError>>, String), Failu
 
 fn exit(record: &Record) -> Exit {
     let s = &record.summary;
-    if s.failed_cases > 0 {
+    if s.failed_cases + s.failed_judges > 0 {
         Exit::Incomplete
     } else if s.fail > 0 {
         Exit::Failed

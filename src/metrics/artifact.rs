@@ -3,7 +3,7 @@
 
 use super::{
     Absent, Metric, MetricName,
-    judge::{Judge, contrast_of_means},
+    judge::{JudgedRegions, contrast_of_means},
     regions::{Region, Regions},
 };
 use crate::stats::{Estimate, Group, jackknife};
@@ -100,7 +100,7 @@ impl Method<'_> {
     }
 
     /// dK = K - K(Q), with its reading as the note where it is clearly not zero.
-    pub fn contrast_error(&self, judge: Result<&Judge, Absent>) -> Metric {
+    pub fn contrast_error(&self, judge: Result<&JudgedRegions, Absent>) -> Metric {
         let estimate = judge.clone().and_then(|judge| {
             Ok(jackknife(&[self.rows()?, judge.means.clone()], |m| {
                 contrast(m[0][0], m[0][1]) - contrast_of_means(&m[1], judge.brighter)
@@ -116,11 +116,11 @@ impl Method<'_> {
 
     /// 1 - max(0, dK) / dK(classic). The two methods share their seeds, so
     /// replicates are paired.
-    pub fn removed(&self, classic: &Method<'_>, judge: Result<&Judge, Absent>) -> Metric {
+    pub fn removed(&self, classic: &Method<'_>, judge: Result<&JudgedRegions, Absent>) -> Metric {
         Metric::new(MetricName::Removed, None, judge.and_then(|judge| self.removed_estimate(classic, judge)))
     }
 
-    fn removed_estimate(&self, classic: &Method<'_>, judge: &Judge) -> Result<Estimate, Absent> {
+    fn removed_estimate(&self, classic: &Method<'_>, judge: &JudgedRegions) -> Result<Estimate, Absent> {
         let error = classic.contrast_error(Ok(judge));
         let clear = error.estimate().is_some_and(|e| e.interval(0.95)[0] > 0.0);
         if !clear {

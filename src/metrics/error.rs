@@ -4,7 +4,7 @@
 use super::{
     Absent, Metric, MetricName,
     artifact::Method,
-    judge::Judge,
+    judge::QImage,
     regions::{MIN_PIXELS, Region, Regions},
 };
 use crate::stats::Estimate;
@@ -18,11 +18,11 @@ fn over_replicates(
     Ok(Estimate::of_mean(&values?))
 }
 
-/// Mean openness of every region that is large enough.
-pub fn openness(method: &Method<'_>) -> Vec<Metric> {
-    Region::ALL
-        .into_iter()
-        .map(|region| {
+/// Mean openness of regions; null for one that is too small.
+pub fn openness(method: &Method<'_>, regions: &[Region]) -> Vec<Metric> {
+    regions
+        .iter()
+        .map(|&region| {
             let estimate = over_replicates(method.replicates, |_, image| method.regions.mean(region, image));
             Metric::new(MetricName::Openness, Some(region), estimate)
         })
@@ -57,30 +57,35 @@ pub fn against_converged(method: &Method<'_>, region: Region) -> [Metric; 3] {
     ]
 }
 
-/// The physical error of a region: mean openness less the region's Q, and the
-/// root mean square of O - Q over the pixels whose Q is not masked.
-pub fn against_judge(method: &Method<'_>, judge: Result<&Judge, Absent>, region: Region) -> [Metric; 2] {
-    let bias = judge.clone().and_then(|judge| judge_bias(method, judge, region));
-    let rmse = judge.and_then(|judge| judge_rmse(method, judge, region));
-    [Metric::new(MetricName::JudgeBias, Some(region), bias), Metric::new(MetricName::JudgeRmse, Some(region), rmse)]
-}
-
-fn judge_bias(method: &Method<'_>, judge: &Judge, region: Region) -> Result<Estimate, Absent> {
-    let q = judge.q_of(region).ok_or_else(|| Absent("the judge has no such region".into()))?;
-    let o = over_replicates(method.replicates, |_, image| method.regions.mean(region, image))?;
-    Ok(o.less(&q))
-}
-
-fn judge_rmse(method: &Method<'_>, judge: &Judge, region: Region) -> Result<Estimate, Absent> {
-    let pixels: Vec<usize> =
-        method.regions.pixels(region).iter().map(|&i| i as usize).filter(|&i| !judge.masked(i)).collect();
-    if pixels.len() < MIN_PIXELS {
-        return Err(Absent(format!("only {} pixels of Q are not masked", pixels.len())));
-    }
-    over_replicates(method.replicates, |_, image| {
-        let sum: f64 = pixels.iter().map(|&i| f64::from(image[i] - judge.q[i]).powi(2)).sum();
-        Ok((sum / pixels.len() as f64).sqrt())
-    })
+/// The physical error of a region: mean openness less the region's Q, and mean
+/// absolute value and root mean square of O - Q over the pixels whose Q is not
+/// masked. Of one replicate each, as against the converged image; the noise of Q's
+/// image, below 5 % of Q a pixel, is part of the last two. Where many pixels are masked, these
+/// two speak of the others only, and may come out below the bias.
+pub fn against_judge(
+    method: &Method<'_>,
+    q: Result<Estimate, Absent>,
+    image: &Result<&QImage, Absent>,
+    region: Region,
+) -> [Metric; 3] {
+    let bias = q.and_then(|q| Ok(over_replicates(method.replicates, |_, o| method.regions.mean(region, o))?.less(&q)));
+    let of = |f: fn(f64) -> f64, finish: fn(f64) -> f64| {
+        let image = image.clone()?;
+        let all = method.regions.measurable(region)?;
+        let pixels: Vec<usize> = all.iter().map(|&i| i as usize).filter(|&i| !image.masked(i)).collect();
+        if pixels.len() < MIN_PIXELS {
+            return Err(Absent(format!("only {} pixels of Q are not masked", pixels.len())));
+        }
+        over_replicates(method.replicates, |_, own| {
+            let sum: f64 = pixels.iter().map(|&i| f(f64::from(own[i] - image.q[i]))).sum();
+            Ok(finish(sum / pixels.len() as f64))
+        })
+    };
+    [
+        Metric::new(MetricName::JudgeBias, Some(region), bias),
+        Metric::new(MetricName::JudgeMae, Some(region), of(f64::abs, |m| m)),
+        Metric::new(MetricName::JudgeRmse, Some(region), of(|d| d * d, f64::sqrt)),
+    ]
 }
 
 /// Mean of O(classic) - O over the whole image, replicates paired by seed.

@@ -22,19 +22,33 @@ pub struct Pair {
     pub without: Vec<f32>,
 }
 
-/// Everything metrics need of the judge: region means a replicate, and images.
+/// What metrics need of the judge: the regions' irradiances, and images.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judge {
+    /// Means over the regions.
+    pub regions: JudgedRegions,
+    /// Q a pixel.
+    pub image: QImage,
+}
+
+/// Mean irradiance of footprint and flanks in each replicate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JudgedRegions {
     /// A row a replicate: E_with, then E_without, of footprint, left, right.
     pub means: Group,
-    /// Q a pixel; NaN where E_without is zero or there is no surface.
-    pub q: Vec<f32>,
-    /// Relative standard error of Q a pixel.
-    pub q_relative_se: Vec<f32>,
-    /// Irradiance over pi a pixel, with and without.
-    pub irradiance: [Vec<f32>; 2],
     /// Which flank's Q is brighter.
     pub brighter: Brighter,
+}
+
+/// Images of the judge, a value a pixel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct QImage {
+    /// Q; NaN where E_without is zero or there is no surface.
+    pub q: Vec<f32>,
+    /// Relative standard error of Q.
+    pub relative_se: Vec<f32>,
+    /// Irradiance over pi, with and without the occluder.
+    pub irradiance: [Vec<f32>; 2],
 }
 
 /// Q of a region from the column means of a judge group.
@@ -48,12 +62,41 @@ pub fn contrast_of_means(means: &[f64], brighter: Brighter) -> f64 {
     contrast(ratio(means, 0), flank)
 }
 
-impl Judge {
-    /// The regions the judge speaks of, in the order of a group's columns: first
-    /// their E_with, then their E_without.
-    pub const REGIONS: [Region; 3] = [Region::Footprint, Region::Left, Region::Right];
+/// Half width of an estimate's 95 % interval over its value; infinite where it is
+/// not known.
+fn relative_half_width(e: Estimate) -> f64 {
+    let [lo, hi] = e.interval(0.95);
+    let half = (hi - lo) / 2.0;
+    // Exactly nothing, as under a sealed occluder, is exactly known.
+    let relative = if half == 0.0 { 0.0 } else { half / e.value };
+    if relative.is_nan() { f64::INFINITY } else { relative }
+}
 
-    /// Works out the judge from its replicates.
+/// Q of one region, where its irradiances and their ratio are known to the
+/// precision wanted: half width of the 95 % interval over the value.
+///
+/// # Errors
+/// Where the region is too small or the judge too vague there.
+pub fn region_q(pairs: &[Pair], regions: &Regions, region: Region, precision: f64) -> Result<Estimate, Absent> {
+    let rows: Result<Group, Absent> =
+        pairs.iter().map(|p| Ok(vec![regions.mean(region, &p.with)?, regions.mean(region, &p.without)?])).collect();
+    let rows = [rows?];
+    let q = jackknife(&rows, |m| m[0][0] / m[0][1]);
+    let widest = (0..2).map(|c| jackknife(&rows, |m| m[0][c])).chain([q]).map(relative_half_width).fold(0.0, f64::max);
+    if widest <= precision { Ok(q) } else { Err(vague(widest, pairs.len(), precision)) }
+}
+
+/// Why metrics take nothing from a judge that is less precise than asked.
+pub fn vague(precision: f64, replicates: usize, wanted: f64) -> Absent {
+    Absent(format!(
+        "the judge is less precise than asked: {:.2} % of a region mean after {replicates} replicates, {:.2} % wanted",
+        precision * 100.0,
+        wanted * 100.0
+    ))
+}
+
+impl JudgedRegions {
+    /// Averages a judge's replicates over regions.
     ///
     /// # Errors
     /// Where a region is too small to measure.
@@ -62,32 +105,15 @@ impl Judge {
         for pair in replicates {
             let mut row = Vec::with_capacity(6);
             for image in [&pair.with, &pair.without] {
-                for region in Self::REGIONS {
+                for region in Judge::REGIONS {
                     row.push(regions.mean(region, image)?);
                 }
             }
             means.push(row);
         }
-        let pixels = replicates.first().map_or(0, |p| p.with.len());
-        let mut judge = Judge {
-            means,
-            q: Vec::with_capacity(pixels),
-            q_relative_se: Vec::with_capacity(pixels),
-            irradiance: [Vec::with_capacity(pixels), Vec::with_capacity(pixels)],
-            brighter: Brighter::Left,
-        };
-        for i in 0..pixels {
-            let (with, without): (Vec<f64>, Vec<f64>) =
-                replicates.iter().map(|p| (f64::from(p.with[i]), f64::from(p.without[i]))).unzip();
-            let (q, se) = ratio_of_means(&with, &without);
-            judge.q.push(q as f32);
-            judge.q_relative_se.push((se / q) as f32);
-            judge.irradiance[0].push(mean_variance(&with).0 as f32);
-            judge.irradiance[1].push(mean_variance(&without).0 as f32);
-        }
-        let [left, right] = [1, 2].map(|r| judge.region(r).value);
-        judge.brighter = Brighter::of(left, right);
-        Ok(judge)
+        let mut judged = JudgedRegions { means, brighter: Brighter::Left };
+        judged.brighter = Brighter::of(judged.region(1).value, judged.region(2).value);
+        Ok(judged)
     }
 
     fn region(&self, index: usize) -> Estimate {
@@ -96,22 +122,16 @@ impl Judge {
 
     /// Q of a region: the ratio of its mean irradiances.
     pub fn q_of(&self, region: Region) -> Option<Estimate> {
-        Self::REGIONS.iter().position(|&r| r == region).map(|i| self.region(i))
+        Judge::REGIONS.iter().position(|&r| r == region).map(|i| self.region(i))
     }
 
     /// The widest 95 % interval among the regions' irradiances and ratios, as
     /// half width over value; infinite where one is not known.
     pub fn widest(&self) -> f64 {
-        let half = |e: Estimate| {
-            let [lo, hi] = e.interval(0.95);
-            let half = (hi - lo) / 2.0;
-            // Exactly nothing, as under a sealed occluder, is exactly known.
-            let relative = if half == 0.0 { 0.0 } else { half / e.value };
-            if relative.is_nan() { f64::INFINITY } else { relative }
-        };
         (0..6)
-            .map(|c| half(jackknife(std::slice::from_ref(&self.means), |m| m[0][c])))
-            .chain((0..3).map(|r| half(self.region(r))))
+            .map(|c| jackknife(std::slice::from_ref(&self.means), |m| m[0][c]))
+            .chain((0..3).map(|r| self.region(r)))
+            .map(relative_half_width)
             .fold(0.0, f64::max)
     }
 
@@ -125,10 +145,43 @@ impl Judge {
     pub fn contrast(&self) -> Estimate {
         jackknife(std::slice::from_ref(&self.means), |m| contrast_of_means(&m[0], self.brighter))
     }
+}
+
+impl QImage {
+    /// Q a pixel from a judge's replicates.
+    pub fn new(replicates: &[Pair]) -> Self {
+        let pixels = replicates.first().map_or(0, |p| p.with.len());
+        let empty = || Vec::with_capacity(pixels);
+        let mut image = QImage { q: empty(), relative_se: empty(), irradiance: [empty(), empty()] };
+        for i in 0..pixels {
+            let (with, without): (Vec<f64>, Vec<f64>) =
+                replicates.iter().map(|p| (f64::from(p.with[i]), f64::from(p.without[i]))).unzip();
+            let (q, se) = ratio_of_means(&with, &without);
+            image.q.push(q as f32);
+            image.relative_se.push((se / q) as f32);
+            image.irradiance[0].push(mean_variance(&with).0 as f32);
+            image.irradiance[1].push(mean_variance(&without).0 as f32);
+        }
+        image
+    }
 
     /// Whether a pixel of Q is too noisy to show.
     pub fn masked(&self, pixel: usize) -> bool {
-        too_noisy(self.q_relative_se[pixel])
+        too_noisy(self.relative_se[pixel])
+    }
+}
+
+impl Judge {
+    /// The regions the judge speaks of, in the order of a group's columns: first
+    /// their E_with, then their E_without.
+    pub const REGIONS: [Region; 3] = [Region::Footprint, Region::Left, Region::Right];
+
+    /// Works out the judge from its replicates.
+    ///
+    /// # Errors
+    /// Where a region is too small to measure.
+    pub fn new(replicates: &[Pair], regions: &Regions) -> Result<Self, Absent> {
+        Ok(Judge { regions: JudgedRegions::new(replicates, regions)?, image: QImage::new(replicates) })
     }
 }
 

@@ -2,6 +2,7 @@
 //! ([`artifact`]), how wrong ([`error`]).
 
 pub mod artifact;
+pub mod convergence;
 pub mod error;
 pub mod image;
 pub mod judge;
@@ -40,6 +41,9 @@ pub enum MetricName {
     /// Mean of O less the region's Q. Reported, never gated: it measures the
     /// direction of light more than AO.
     JudgeBias,
+    /// Mean absolute value of O less Q over the region's unmasked pixels.
+    /// Reported, never gated.
+    JudgeMae,
     /// Root mean square of O less Q over the region's unmasked pixels. Reported,
     /// never gated.
     JudgeRmse,
@@ -63,6 +67,7 @@ impl MetricName {
             MetricName::Mae => "mae",
             MetricName::Rmse => "rmse",
             MetricName::JudgeBias => "judge-bias",
+            MetricName::JudgeMae => "judge-mae",
             MetricName::JudgeRmse => "judge-rmse",
             MetricName::OverDarkening => "over-darkening",
             MetricName::RendererDifference => "renderer-difference",
@@ -122,6 +127,40 @@ impl Metric {
             Some(region) => format!("{} over {}", self.name.label(), region.label()),
             None => self.name.label().to_owned(),
         }
+    }
+}
+
+/// A number with its uncertainty, of which the place in a record says what it is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Quantity {
+    /// The value; null where it is not defined.
+    pub value: Option<f64>,
+    /// Its standard error; null where it is not known.
+    pub se: Option<f64>,
+    /// Degrees of freedom of the standard error.
+    pub df: Option<f64>,
+    /// Why the value is null.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub note: Option<String>,
+}
+
+impl Quantity {
+    /// A measured quantity, or why there is none.
+    pub fn new(estimate: Result<Estimate, Absent>) -> Self {
+        let finite = |v: f64| v.is_finite().then_some(v);
+        match estimate {
+            Ok(e) if e.value.is_finite() => {
+                Quantity { value: Some(e.value), se: finite(e.se), df: finite(e.df), note: None }
+            }
+            Ok(_) => Self::new(Err(Absent("the value is not a finite number".into()))),
+            Err(Absent(why)) => Quantity { value: None, se: None, df: None, note: Some(why) },
+        }
+    }
+
+    /// Value and standard error, where both are known.
+    pub fn estimate(&self) -> Option<Estimate> {
+        Some(Estimate { value: self.value?, se: self.se?, df: self.df.unwrap_or(1.0) })
     }
 }
 

@@ -1,29 +1,18 @@
 //! Which receiver points lie under the occluder, beside it, and far away, from
 //! geometry alone.
 
+mod finder;
+
+pub use finder::{Finder, OccluderRegions};
+
 use super::Absent;
-use crate::{
-    render::gbuffer::{GBuffer, Surface},
-    trace::Tracer,
-};
-use aogauge_scenes::{Scene, clip};
-use glam::{Vec2, Vec3};
-use rayon::prelude::*;
+use crate::{render::gbuffer::GBuffer, trace::Tracer};
+use aogauge_scenes::Scene;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Fewer pixels than this make a region's metrics null.
 pub const MIN_PIXELS: usize = 64;
-
-/// How far the footprint reaches beyond the sheet, in R.
-const FOOTPRINT_MARGIN: f32 = 0.02;
-/// Where the flanks begin and end, in R from the sheet.
-const FLANK: [f32; 2] = [0.15, 0.45];
-/// What still counts as the receiver's own plane, in R.
-const OWN_PLANE: f32 = 1e-3;
-/// Pixel centres that lie on a border by construction must not fall to rounding,
-/// in R.
-const ROUNDING: f32 = 1e-4;
 
 /// A part of the receiver (DESIGN, "The words").
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
@@ -64,28 +53,10 @@ pub struct Regions {
 }
 
 impl Regions {
-    /// Finds the regions of what the scene's measure view sees.
+    /// Finds the regions of what the scene's measure view sees; `tracer` holds the
+    /// whole scene.
     pub fn new(scene: &Scene, tracer: &Tracer, gbuffer: &GBuffer) -> Self {
-        let part = |occluder: bool| {
-            let triangles: Vec<[Vec3; 3]> =
-                scene.triangles().filter(|(o, _)| scene.objects[*o].occluder == occluder).map(|(_, t)| t).collect();
-            Tracer::new(&triangles)
-        };
-        let finder = Finder {
-            sheet: part(true),
-            receiver: part(false),
-            scene: tracer,
-            transect: scene.measure.transect,
-            radius: scene.ao.radius,
-        };
-        let found: Vec<[bool; 5]> = gbuffer
-            .surfaces
-            .par_iter()
-            .map(|surface| surface.as_ref().map_or([false; 5], |s| finder.classify(s)))
-            .collect();
-        let pixels =
-            std::array::from_fn(|region| (0..found.len() as u32).filter(|&i| found[i as usize][region]).collect());
-        Regions { pixels }
+        Finder::new(scene, tracer).regions(gbuffer)
     }
 
     /// The same regions without the pixels that `keep` refuses.
@@ -134,140 +105,12 @@ impl Regions {
     }
 }
 
-/// What regions are found with.
-struct Finder<'a> {
-    sheet: Tracer,
-    receiver: Tracer,
-    scene: &'a Tracer,
-    transect: Vec3,
-    radius: f32,
-}
-
-impl Finder<'_> {
-    /// Membership of one receiver point in each region.
-    fn classify(&self, s: &Surface) -> [bool; 5] {
-        let mut member = [false; 5];
-        member[Region::All as usize] = true;
-        if let Some(to) = self.to_shadow(s) {
-            let distance = to.length() / self.radius;
-            member[Region::Footprint as usize] = distance <= FOOTPRINT_MARGIN + ROUNDING;
-            // Beside the sheet, not beyond its end.
-            let beside = to.x.abs() > to.y.abs();
-            if beside && (FLANK[0] - ROUNDING..=FLANK[1] + ROUNDING).contains(&distance) {
-                let side = if to.x > 0.0 { Region::Left } else { Region::Right };
-                member[side as usize] = true;
-            }
-        }
-        let off_plane = |v: &Vec3| s.normal.dot(*v - s.point).abs() > OWN_PLANE * self.radius;
-        let foreign = |t: &[Vec3; 3]| t.iter().any(off_plane);
-        member[Region::Far as usize] = self.scene.nearest(s.point, self.radius, foreign).is_none();
-        member
-    }
-
-    /// The vector, measured along the receiver, from `s` to the nearest point of
-    /// the sheet's shadow: zero where the sheet stands over `s`, None where none
-    /// of it is near. x is along the transect.
-    ///
-    /// The shadow is taken in the tangent plane of the receiver under the sheet's
-    /// nearest point, and `s` is unrolled into that plane by its arc length. On a
-    /// flat receiver that changes nothing; on a cylinder it is exact.
-    fn to_shadow(&self, s: &Surface) -> Option<Vec2> {
-        let reach = self.radius * (1.0 + FLANK[1]);
-        let sheet = self.sheet.nearest(s.point, reach, |_| true)?;
-        let base = self.base(s, sheet.point);
-        let x = (self.transect - base.normal * base.normal.dot(self.transect)).normalize_or_zero();
-        let plane = Plane { origin: base.point, x, y: base.normal.cross(x), normal: base.normal };
-        let from = plane.unroll(s);
-        let mut nearest: Option<Vec2> = None;
-        self.sheet.near(s.point, reach, |triangle| {
-            if let Some(to) = plane.nearest_shadow(from, triangle, self.radius)
-                && nearest.is_none_or(|n| to.length_squared() < n.length_squared())
-            {
-                nearest = Some(to);
-            }
-        });
-        nearest
-    }
-
-    /// The receiver under a point of the sheet; `s` itself where the receiver
-    /// there looks another way (round a corner arc length means nothing).
-    fn base(&self, s: &Surface, sheet: Vec3) -> Surface {
-        let Some(at) = self.receiver.nearest(sheet, self.radius, |_| true) else {
-            return *s;
-        };
-        let [a, b, c] = self.receiver.triangles()[at.triangle as usize];
-        let normal = (b - a).cross(c - a).normalize_or_zero();
-        let normal = if normal.dot(sheet - at.point) < 0.0 { -normal } else { normal };
-        if normal.dot(s.normal) <= 0.0 {
-            return *s;
-        }
-        Surface { point: at.point, normal, triangle: at.triangle }
-    }
-}
-
-/// A tangent plane of the receiver.
-struct Plane {
-    origin: Vec3,
-    x: Vec3,
-    y: Vec3,
-    normal: Vec3,
-}
-
-impl Plane {
-    /// A point of the receiver laid into the plane at its arc length from the
-    /// origin, taken for that of a circle: chord (a/2) / sin(a/2), a the angle
-    /// between the normals.
-    fn unroll(&self, s: &Surface) -> Vec2 {
-        let d = s.point - self.origin;
-        let flat = Vec2::new(d.dot(self.x), d.dot(self.y));
-        let half = 0.5 * self.normal.cross(s.normal).length().atan2(self.normal.dot(s.normal));
-        if half < 1e-3 {
-            return flat;
-        }
-        flat.normalize_or_zero() * (d.length() * half / half.sin())
-    }
-
-    /// The vector in the plane from `from` to the nearest point of a triangle's
-    /// shadow: its part between 0 and `radius` above the plane, projected along
-    /// the normal. None where it has no such part; zero where it holds `from`.
-    fn nearest_shadow(&self, from: Vec2, triangle: &[Vec3; 3], radius: f32) -> Option<Vec2> {
-        let local = triangle.map(|v| {
-            let d = v - self.origin;
-            Vec3::new(d.dot(self.x) - from.x, d.dot(self.y) - from.y, self.normal.dot(d))
-        });
-        let above = clip(&local, |v| v.z);
-        let slab = clip(&above, |v| radius - v.z);
-        let polygon: Vec<Vec2> = slab.iter().map(|v| v.truncate()).collect();
-        nearest_of_polygon(&polygon)
-    }
-}
-
-/// The point of a convex polygon that is nearest to the origin.
-fn nearest_of_polygon(polygon: &[Vec2]) -> Option<Vec2> {
-    let n = polygon.len();
-    let edge = |i: usize| (polygon[i], polygon[(i + 1) % n] - polygon[i]);
-    let side = |i: usize| {
-        let (a, e) = edge(i);
-        e.perp_dot(-a)
-    };
-    if n > 0 && ((0..n).all(|i| side(i) > 0.0) || (0..n).all(|i| side(i) < 0.0)) {
-        return Some(Vec2::ZERO);
-    }
-    (0..n)
-        .map(|i| {
-            let (a, e) = edge(i);
-            let along = e.length_squared();
-            let t = if along > 0.0 { (-a.dot(e) / along).clamp(0.0, 1.0) } else { 0.0 };
-            a + e * t
-        })
-        .min_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::render::Geometry;
     use aogauge_scenes::library;
+    use glam::{Vec2, Vec3};
 
     fn regions(name: &str) -> (Scene, GBuffer, Regions) {
         let scene = library::scene(name).unwrap();

@@ -220,6 +220,22 @@ pub enum RenderError {
     /// The adapter has no ray query, or not for so large a scene.
     #[error("the GPU cannot trace by ray query: {0}; --traversal software can do without")]
     RayQuery(String),
+    /// An image holds NaN or infinity where there must be a number.
+    #[error(
+        "{count} values of replicate {replicate} are no finite numbers although their pixels see a surface, the first at pixel ({x}, {y}): {value}"
+    )]
+    NotFinite {
+        /// How many values.
+        count: usize,
+        /// In which replicate, counted from 0.
+        replicate: u32,
+        /// Column of the first, from the left.
+        x: u32,
+        /// Its row, from the top.
+        y: u32,
+        /// Its value.
+        value: f32,
+    },
     /// The device was lost, ran out of memory or refused a command.
     #[error("the GPU failed: {0}")]
     Device(String),

@@ -1,10 +1,15 @@
 //! The Markdown report.
 
-use super::error_maps::{self, LIMIT_CONVERGED, LIMIT_Q, MINUS_CONVERGED, MINUS_Q};
-use super::table::{self, Row, outcome_text, plus_minus, subject, value_text};
+use super::{
+    convergence::{self, ConvergenceRow},
+    error_maps::{self, LIMIT_CONVERGED, LIMIT_Q, MINUS_CONVERGED, MINUS_Q},
+    occluders::{self, OccluderCaseRow, OccluderRow},
+    pooled::{self, PooledRow},
+    table::{self, Row, detectable_text, outcome_text, plus_minus, subject, value_text},
+};
 use crate::{
     gate::{CONFIDENCE, Outcome},
-    metrics::{Metric, MetricName, artifact::Brighter, regions::Region},
+    metrics::{Metric, MetricName, artifact::Brighter, convergence::TARGET, regions::Region},
     record::{CaseRecord, Record, SceneRecord, ScreenRecord, Stopped},
 };
 use minijinja::{Environment, syntax::SyntaxConfig, value::Serde};
@@ -20,6 +25,9 @@ struct Context<'a> {
     record: &'a Record,
     headline: &'a str,
     rows: Vec<Row>,
+    pooled: Vec<PooledRow>,
+    pooled_scenes: Vec<String>,
+    target: f64,
     verdicts: Vec<VerdictRow>,
     scenes: Vec<SceneSection>,
     judge_seconds: f64,
@@ -53,6 +61,7 @@ struct VerdictRow {
     subject: String,
     metric: String,
     value: String,
+    detectable: String,
     limit: String,
 }
 
@@ -72,6 +81,12 @@ struct SceneSection {
     /// Methods that there is a map of against their converged image.
     fewest: Vec<Fewest>,
     cases: Vec<CaseRow>,
+    occluders: Vec<OccluderRow>,
+    occluder_cases: Vec<OccluderCaseRow>,
+    convergence: Vec<ConvergenceRow>,
+    convergence_notes: Vec<String>,
+    /// Errors under the occluder and beside it.
+    errors_by_region: Vec<ErrorRow>,
     regions: String,
     errors: Vec<String>,
     /// Why cells hold no number.
@@ -94,7 +109,28 @@ struct CaseRow {
     milliseconds: String,
 }
 
-fn show(metric: Option<&Metric>) -> String {
+/// A case's errors over one region.
+#[derive(Serialize)]
+struct ErrorRow {
+    case: String,
+    region: &'static str,
+    /// Openness; bias, MAE, RMSE against the converged image; the same against Q.
+    cells: [String; 7],
+}
+
+fn errors_by_region(cases: &[&CaseRecord]) -> Vec<ErrorRow> {
+    use MetricName::{Bias, JudgeBias, JudgeMae, JudgeRmse, Mae, Openness, Rmse};
+    let names = [Openness, Bias, Mae, Rmse, JudgeBias, JudgeMae, JudgeRmse];
+    let row = |c: &CaseRecord, region: Region| ErrorRow {
+        case: format!("{}/{}/{}", c.case.estimator, c.case.renderer, c.case.rays),
+        region: region.label(),
+        cells: names.map(|name| show(c.metric(name, Some(region)))),
+    };
+    let regions = [Region::Footprint, Region::Left, Region::Right];
+    cases.iter().filter(|c| c.error.is_none()).flat_map(|c| regions.map(|r| row(c, r))).collect()
+}
+
+pub(super) fn show(metric: Option<&Metric>) -> String {
     match metric {
         None => "–".to_owned(),
         Some(m) => match m.estimate() {
@@ -189,6 +225,9 @@ fn screen_text(scene: &SceneRecord, screen: &ScreenRecord) -> String {
 
 fn section(record: &Record, scene: &SceneRecord) -> SceneSection {
     let cases: Vec<&CaseRecord> = record.cases.iter().filter(|c| c.case.scene == scene.name).collect();
+    let (convergence, convergence_notes) = convergence::rows(record, scene);
+    let failed_judge = scene.judge_error.iter().cloned();
+    let failed = cases.iter().filter_map(|c| Some(format!("`{}`: {}", c.case.id(), c.error.as_ref()?)));
     SceneSection {
         name: scene.name.clone(),
         description: scene.description.clone(),
@@ -204,7 +243,12 @@ fn section(record: &Record, scene: &SceneRecord) -> SceneSection {
         cases: cases.iter().filter(|c| c.error.is_none()).map(|c| case_row(record, c, scene.judge.is_some())).collect(),
         regions: scene.regions.iter().map(|(r, n)| format!("{} {n}", r.label())).collect::<Vec<_>>().join(", "),
         absent: absent(&cases),
-        errors: cases.iter().filter_map(|c| Some(format!("`{}`: {}", c.case.id(), c.error.as_ref()?))).collect(),
+        occluders: occluders::rows(scene),
+        occluder_cases: occluders::cases(scene, &cases),
+        convergence,
+        convergence_notes,
+        errors_by_region: if scene.judge.is_some() { errors_by_region(&cases) } else { vec![] },
+        errors: failed_judge.chain(failed).collect(),
     }
 }
 
@@ -218,7 +262,8 @@ fn fewest(record: &Record, scene: &SceneRecord) -> Vec<Fewest> {
 
 /// Each reason for a missing number once.
 fn absent(cases: &[&CaseRecord]) -> Vec<String> {
-    let metrics = cases.iter().flat_map(|c| &c.metrics).filter(|m| m.estimate().is_none());
+    let by_occluder = cases.iter().flat_map(|c| &c.occluders).flat_map(|o| &o.metrics);
+    let metrics = cases.iter().flat_map(|c| &c.metrics).chain(by_occluder).filter(|m| m.estimate().is_none());
     let mut notes: Vec<String> = metrics.filter_map(|m| m.note.clone()).collect();
     notes.sort();
     notes.dedup();
@@ -245,11 +290,12 @@ pub fn text(record: &Record) -> Result<String, minijinja::Error> {
             subject: subject(v),
             metric: v.metric.title(),
             value: value_text(v.metric.value, v.interval),
+            detectable: detectable_text(v.detectable),
             limit: v.limit.text(),
         })
         .collect();
     let rows: Vec<Row> = table::rows(record);
-    let headline = if record.summary.failed_cases > 0 {
+    let headline = if record.summary.failed_cases + record.summary.failed_judges > 0 {
         "INCOMPLETE"
     } else if record.summary.fail > 0 {
         outcome_text(Outcome::Fail)
@@ -260,10 +306,14 @@ pub fn text(record: &Record) -> Result<String, minijinja::Error> {
     };
     let scenes: Vec<SceneSection> = record.scenes.iter().map(|s| section(record, s)).collect();
     let judge_seconds: f64 = record.timing.judges.values().sum();
+    let (pooled, pooled_scenes) = pooled::rows(record);
     environment.get_template("report")?.render(Serde(Context {
         record,
         headline,
         rows,
+        pooled,
+        pooled_scenes,
+        target: TARGET,
         verdicts,
         scenes,
         judge_seconds,

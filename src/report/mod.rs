@@ -2,11 +2,14 @@
 //! report can be made again from a record at any time.
 
 pub mod bench;
+mod convergence;
 mod error_maps;
 pub mod flatland;
 mod markdown;
+mod occluders;
 pub(crate) mod picture;
 mod plot;
+mod pooled;
 pub mod table;
 
 use crate::{

@@ -20,6 +20,8 @@ pub struct Row {
     pub nearest: String,
     /// Its value with the interval.
     pub value: String,
+    /// The smallest effect that its verdict would have seen.
+    pub detectable: String,
     /// The limit.
     pub limit: String,
     /// Why, for what did not pass.
@@ -61,6 +63,15 @@ pub fn plus_minus(value: f64, [lo, hi]: [f64; 2]) -> String {
     format!("{value:.d$}\u{a0}±\u{a0}{half:.d$}")
 }
 
+/// A smallest detectable effect with two digits that count.
+pub fn detectable_text(detectable: Option<f64>) -> String {
+    match detectable {
+        None => "–".to_owned(),
+        Some(0.0) => "0".to_owned(),
+        Some(d) => format!("{d:.0$}", (1.0 - d.log10().floor()).clamp(0.0, 9.0) as usize),
+    }
+}
+
 /// The case of a verdict, or `scene (judge)`.
 pub fn subject(verdict: &Verdict) -> String {
     verdict.case.as_ref().map_or_else(|| format!("{} (judge)", verdict.scene), crate::suite::Case::id)
@@ -98,6 +109,7 @@ pub fn rows(record: &Record) -> Vec<Row> {
                 cases: of_gate().count(),
                 nearest: subject(nearest),
                 value: value_text(nearest.metric.value, nearest.interval),
+                detectable: detectable_text(nearest.detectable),
                 limit: nearest.limit.text(),
                 reason: (worst != Outcome::Pass).then(|| nearest.reason.clone()),
             })
@@ -105,15 +117,18 @@ pub fn rows(record: &Record) -> Vec<Row> {
         .collect()
 }
 
-/// The table as plain text, columns aligned.
+/// The table as plain text, columns aligned; `sees` is the smallest detectable effect.
 pub fn plain(record: &Record) -> String {
     let rows = rows(record);
     let width = |f: fn(&Row) -> &str| rows.iter().map(|r| f(r).chars().count()).max().unwrap_or(0);
     let (a, b, c, d) = (width(|r| r.outcome), width(|r| &r.gate), width(|r| &r.nearest), width(|r| &r.value));
+    let e = width(|r| &r.detectable);
     let mut text = String::new();
     for r in &rows {
-        let Row { outcome, gate, nearest, value, limit, cases, .. } = r;
-        text += &format!("{outcome:<a$}  {gate:<b$}  {cases:>3}x  {nearest:<c$}  {value:<d$}  {limit}\n");
+        let Row { outcome, gate, nearest, value, detectable, limit, cases, .. } = r;
+        text += &format!(
+            "{outcome:<a$}  {gate:<b$}  {cases:>3}x  {nearest:<c$}  {value:<d$}  sees {detectable:<e$}  {limit}\n"
+        );
         if let Some(reason) = &r.reason {
             text += &format!("{:a$}  {reason}\n", "");
         }
@@ -135,5 +150,7 @@ mod tests {
         assert_eq!(value_text(Some(1.0), Some([1.0, 1.0])), "1.0000 [1.0000, 1.0000]");
         assert_eq!(plus_minus(0.123_456, [0.118_456, 0.128_456]), "0.1235\u{a0}±\u{a0}0.0050");
         assert_eq!(value_text(None, None), "none");
+        assert_eq!(detectable_text(Some(0.001_234)), "0.0012");
+        assert_eq!((detectable_text(Some(12.3)), detectable_text(None)), ("12".into(), "–".into()));
     }
 }

@@ -1,8 +1,11 @@
 //! A plan becomes a record: render, measure, judge, write.
 
 mod case_metrics;
+mod faults;
 mod judging;
+mod occluders;
 mod on_screen;
+mod recording;
 mod set;
 
 use crate::{
@@ -10,6 +13,7 @@ use crate::{
     gate::Verdict,
     judge_cache::JudgeCache,
     metrics::{Absent, Metric},
+    pooled::pooled,
     record::{CaseRecord, IdleGate, Machine, Record, RecordFolder, SceneRecord, SuiteInfo, Summary, Timing, VERSION},
     render::{RenderError, Renderer},
     suite::{EstimatorFile, Plan, Suite},
@@ -145,17 +149,19 @@ impl<'a> Prepared<'a> {
         }
         timing.seconds = start.elapsed().as_secs_f64();
         let (verdicts, idle_gates) = verdicts(plan, &machine, &scenes, &cases);
+        let suite = suite_info(plan.suite);
         let record = Record {
             version: VERSION,
             tool: env!("CARGO_PKG_VERSION").to_owned(),
-            suite: suite_info(plan.suite),
             seed: plan.seed,
             machine,
-            summary: Summary::new(&verdicts, &idle_gates, &cases),
+            summary: Summary::new(&verdicts, &idle_gates, &scenes, &cases),
+            pooled: pooled(&suite, &scenes, &cases),
             verdicts,
             idle_gates,
             scenes,
             cases,
+            suite,
             timing,
         };
         folder.commit(&record)?;

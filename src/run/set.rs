@@ -3,7 +3,9 @@
 use super::{
     MAX_GIB, Progress, RunError,
     case_metrics::{Others, metrics},
-    judging::Judged,
+    faults,
+    judging::{Judged, Unjudged},
+    occluders::Occluder,
     on_screen::{OnScreen, is_on_screen},
 };
 use crate::{
@@ -12,15 +14,14 @@ use crate::{
     metrics::{
         Absent,
         artifact::{Converged, Method as Measured},
-        judge::Judge,
-        profile,
-        regions::{Region, Regions},
+        judge::JudgedRegions,
+        regions::{Finder, Region, Regions},
     },
-    record::{CaseRecord, RecordFolder, SceneRecord, Timing},
+    record::{CaseRecord, OccluderMetrics, RecordFolder, SceneRecord, Timing},
     render::{Frame, Geometry, Job, Loaded, RenderError, Renderer, gbuffer::GBuffer, path},
     scenes::{Scene, View},
     stats::mean_variance,
-    suite::{Case, Plan, Rays},
+    suite::{Case, Plan},
 };
 use std::{borrow::Cow, collections::BTreeMap};
 
@@ -49,14 +50,23 @@ pub(super) struct Set<'a> {
     pub(super) view: View,
     pub(super) gbuffer: GBuffer,
     pub(super) regions: Regions,
+    /// One by one, where the view shows two or more.
+    pub(super) occluders: Vec<Occluder>,
     /// For suites with methods of screen space.
     pub(super) on_screen: Option<OnScreen>,
 }
 
 /// The images of one case.
-struct Images {
-    replicates: Vec<Vec<f32>>,
+pub(super) struct Images {
+    pub(super) replicates: Vec<Vec<f32>>,
     seconds: f64,
+}
+
+/// What the images of a method are compared with.
+pub(super) struct Truth {
+    pub(super) converged: Converged,
+    /// Why it must not be used.
+    fault: Option<RenderError>,
 }
 
 impl<'a> Set<'a> {
@@ -80,7 +90,8 @@ impl<'a> Set<'a> {
         if let Some(object) = seen.find(|o| o.occluder) {
             return Err(RunError::SeesOccluder { scene: name(), object: object.name.clone() });
         }
-        let regions = Regions::new(&scene, &geometry.tracer, &gbuffer);
+        let finder = Finder::new(&scene, &geometry.tracer);
+        let regions = finder.regions(&gbuffer);
         if regions.pixels(Region::All).is_empty() {
             return Err(RunError::SeesNothing { scene: name() });
         }
@@ -99,7 +110,9 @@ impl<'a> Set<'a> {
         }
         let hash = given.hash();
         let on_screen = OnScreen::new(plan, &scene, &geometry.tracer, &gbuffer, &regions)?;
-        Ok(Set { plan, scene, hash, geometry, twin, view, gbuffer, regions, on_screen })
+        let occluders = Occluder::all(&finder, &gbuffer, &regions, on_screen.as_ref());
+        drop(finder);
+        Ok(Set { plan, scene, hash, geometry, twin, view, gbuffer, regions, occluders, on_screen })
     }
 
     pub(super) fn run(
@@ -117,8 +130,9 @@ impl<'a> Set<'a> {
         progress.begin(&format!("{}: judge", self.scene.name));
         let judged = self.judge(cache, folder, timing)?;
         progress.end();
-        let mut converged = Vec::with_capacity(methods.len());
-        for method in methods {
+        let mut truths = Vec::with_capacity(methods.len());
+        for (index, method) in methods.iter().enumerate() {
+            let mut fault = None;
             progress.begin(&format!("{}: converged {}", self.scene.name, method.name));
             let replicates = (0..CONVERGED_REPLICATES).map(|replicate| {
                 let job = Job {
@@ -130,9 +144,13 @@ impl<'a> Set<'a> {
                     seed: self.plan.seed.wrapping_add(CONVERGED),
                     replicate,
                 };
-                Ok(loaded_cpu.render(&job).map_err(&fail)?.values)
+                let frame = loaded_cpu.render(&job).map_err(&fail)?;
+                let checked = faults::check_frame(&frame, self.regions(index), replicate);
+                fault = fault.take().or_else(|| checked.err());
+                Ok(frame.values)
             });
-            converged.push(Converged::new(replicates.collect::<Result<_, RunError>>()?));
+            let converged = Converged::new(replicates.collect::<Result<_, RunError>>()?);
+            truths.push(Truth { converged, fault });
             progress.end();
         }
         let mut loaded_gpu = gpu.map(|g| g.load(&self.geometry));
@@ -140,7 +158,10 @@ impl<'a> Set<'a> {
         for case in self.cases() {
             progress.begin(&case.id());
             let rendered = match (case.renderer.as_str(), &mut loaded_gpu) {
-                ("cpu", _) => Ok(self.replicates(case, loaded_cpu.as_mut()).map_err(&fail)?),
+                ("cpu", _) => match self.replicates(case, loaded_cpu.as_mut()) {
+                    Err(e) if !matches!(e, RenderError::NotFinite { .. }) => return Err(fail(e)),
+                    rendered => rendered,
+                },
                 (_, Some(Ok(loaded))) => self.replicates(case, loaded.as_mut()),
                 (_, Some(Err(e))) => Err(RenderError::Device(e.to_string())),
                 (_, None) => Err(RenderError::NoAdapter("the plan asks for one".into())),
@@ -151,27 +172,27 @@ impl<'a> Set<'a> {
             images.insert(case.id(), rendered);
             progress.end();
         }
-        let records = self.case_records(folder, &images, &converged, &judged)?;
+        let records = self.case_records(folder, &images, &truths, &judged)?;
         progress.begin(&format!("{}: pictures", self.scene.name));
         let look = self.look(folder, loaded_cpu.as_mut())?;
         progress.end();
-        let record = self.scene_record(folder, &images, &converged, judged, look)?;
+        let record = self.scene_record(folder, &images, &truths, judged, look)?;
         Ok((record, records))
     }
 
-    fn cases(&self) -> impl Iterator<Item = &'a Case> {
+    pub(super) fn cases(&self) -> impl Iterator<Item = &'a Case> {
         let (plan, name) = (self.plan, &self.scene.name);
         plan.cases.iter().filter(move |c| c.scene == *name)
     }
 
-    fn method(&self, case: &Case) -> usize {
+    pub(super) fn method(&self, case: &Case) -> usize {
         self.plan.suite.methods.iter().position(|m| m.name == case.estimator).unwrap_or(0)
     }
 
     fn replicates(&self, case: &Case, loaded: &mut dyn Loaded) -> Result<Images, RenderError> {
         let mut images = Images { replicates: Vec::new(), seconds: 0.0 };
         for replicate in 0..self.plan.suite.file.replicates.get() {
-            let Frame { values, seconds, .. } = loaded.render(&Job {
+            let frame = loaded.render(&Job {
                 view: &self.view,
                 camera: self.camera(),
                 estimator: self.plan.suite.methods[self.method(case)].estimator,
@@ -180,6 +201,8 @@ impl<'a> Set<'a> {
                 seed: self.plan.seed,
                 replicate,
             })?;
+            faults::check_frame(&frame, self.regions(self.method(case)), replicate)?;
+            let Frame { values, seconds, .. } = frame;
             images.replicates.push(values);
             images.seconds += seconds;
         }
@@ -192,51 +215,56 @@ impl<'a> Set<'a> {
     }
 
     /// Where a method is measured, and what is measured beside it.
-    fn regions(&self, method: usize) -> &Regions {
+    pub(super) fn regions(&self, method: usize) -> &Regions {
         let shown = self.on_screen.as_ref().filter(|_| is_on_screen(&self.plan.suite.methods[method]));
         shown.map_or(&self.regions, |s| &s.regions)
     }
 
     /// The judge of the pixels that a method is measured on.
-    fn judge_of<'b>(&self, method: usize, judged: &'b Result<Judged, Absent>) -> Result<&'b Judge, Absent> {
-        let judged = judged.as_ref().map_err(Clone::clone)?;
+    fn judge_of<'b>(&self, method: usize, judged: &'b Result<Judged, Unjudged>) -> Result<&'b JudgedRegions, Absent> {
+        let judged = judged.as_ref().map_err(Unjudged::absent)?;
         if is_on_screen(&self.plan.suite.methods[method]) {
             return judged.on_screen.as_ref().map_err(Clone::clone);
         }
-        judged.usable.clone().map(|()| &judged.judge)
+        judged.usable.clone().map(|()| &judged.judge.regions)
     }
 
     fn case_records(
         &self,
         folder: &RecordFolder,
         images: &BTreeMap<String, Result<Images, RenderError>>,
-        converged: &[Converged],
-        judged: &Result<Judged, Absent>,
+        truths: &[Truth],
+        judged: &Result<Judged, Unjudged>,
     ) -> Result<Vec<CaseRecord>, RunError> {
         let classic = &self.plan.suite.methods[self.plan.suite.classic()].name;
         let of = |case: &Case| images.get(&case.id()).and_then(|i| i.as_ref().ok());
         let mut records = Vec::new();
         for case in self.cases() {
-            let own = match &images[&case.id()] {
-                Ok(own) => own,
-                Err(e) => {
-                    let error = Some(e.to_string());
-                    records.push(CaseRecord { case: case.clone(), error, image: None, hash: None, metrics: vec![] });
+            let index = self.method(case);
+            let own = match (&images[&case.id()], &truths[index].fault) {
+                (Ok(own), None) => own,
+                (Err(e), _) => {
+                    records.push(CaseRecord::failed(case, e.to_string()));
+                    continue;
+                }
+                (_, Some(e)) => {
+                    records.push(CaseRecord::failed(case, format!("its converged image cannot be used: {e}")));
                     continue;
                 }
             };
-            let index = self.method(case);
             let regions = self.regions(index);
-            let method = measured(own, &converged[index], regions);
+            let method = measured(&own.replicates, &truths[index].converged, regions);
             let on_classic = self.classic_beside(case, classic);
-            let classic_method =
-                of(&on_classic).map(|own| measured(own, &converged[self.method(&on_classic)], regions));
+            let truth = &truths[self.method(&on_classic)];
+            let beside = of(&on_classic).filter(|_| case.estimator != *classic && truth.fault.is_none());
+            let classic_on = |regions| beside.map(|own| measured(&own.replicates, &truth.converged, regions));
             let on_cpu = Case { renderer: "cpu".into(), ..case.clone() };
             let cpu = of(&on_cpu).filter(|_| case.renderer != "cpu").map(|i| i.replicates.as_slice());
             let others = Others {
-                classic: classic_method.filter(|_| case.estimator != *classic),
+                classic: classic_on(regions),
                 cpu,
                 judge: self.judge_of(index, judged),
+                image: judged.as_ref().map_err(Unjudged::absent).and_then(Judged::image),
                 occluder: self.scene.has_occluder(),
             };
             let (image, hash) = self.write_case(folder, case, &own.replicates)?;
@@ -246,9 +274,32 @@ impl<'a> Set<'a> {
                 image: Some(image),
                 hash: Some(hash),
                 metrics: metrics(&method, &others),
+                occluders: self.by_occluder(index, &method, &classic_on, judged),
             });
         }
         Ok(records)
+    }
+
+    /// The metrics of a case under each occluder of several.
+    fn by_occluder<'b>(
+        &'b self,
+        index: usize,
+        method: &Measured<'b>,
+        classic: &dyn Fn(&'b Regions) -> Option<Measured<'b>>,
+        judged: &Result<Judged, Unjudged>,
+    ) -> Vec<OccluderMetrics> {
+        let on_screen = is_on_screen(&self.plan.suite.methods[index]);
+        let judged = judged.as_ref().map_err(Unjudged::absent);
+        let image = judged.clone().and_then(Judged::image);
+        let of = |(i, occluder): (usize, &'b Occluder)| {
+            let regions = occluder.shown.as_ref().filter(|_| on_screen).unwrap_or(&occluder.regions);
+            let own = Measured { regions, ..*method };
+            let judge = judged
+                .clone()
+                .and_then(|j| j.occluder(i, on_screen).ok_or_else(|| Absent("the occluder was not judged".into())));
+            occluder.metrics(&own, classic(regions).as_ref(), &judge, &image)
+        };
+        self.occluders.iter().enumerate().map(of).collect()
     }
 
     /// The case of classic AO that a case is compared with: the one of as many
@@ -311,77 +362,10 @@ impl<'a> Set<'a> {
         layers.write(&folder.path().join(&image))?;
         Ok(image)
     }
-
-    fn scene_record(
-        &self,
-        folder: &RecordFolder,
-        images: &BTreeMap<String, Result<Images, RenderError>>,
-        converged: &[Converged],
-        judged: Result<Judged, Absent>,
-        look: String,
-    ) -> Result<SceneRecord, RunError> {
-        let methods = &self.plan.suite.methods;
-        let pixels = self.view.pixels();
-        let width = self.view.resolution[0];
-        let image = format!("images/{}/regions.exr", self.scene.name);
-        let mut layers = Layers::new(self.view.resolution);
-        for region in Region::ALL {
-            layers = layers.with(&format!("region-{}", region.label()), self.regions.mask(region, pixels));
-        }
-        let mut brighter = BTreeMap::new();
-        for (index, (method, converged)) in methods.iter().zip(converged).enumerate() {
-            let measured = Measured { replicates: &[], converged, regions: self.regions(index) };
-            if let Ok(side) = measured.brighter() {
-                brighter.insert(method.name.clone(), side);
-            }
-            layers = layers.with(&format!("converged-{}", method.name), converged.mean.clone());
-        }
-        layers.write(&folder.path().join(&image))?;
-        let most = |method: usize| {
-            let own = methods[method].rays;
-            own.or_else(|| self.plan.suite.file.rays.iter().copied().max()).map_or(0, Rays::get)
-        };
-        let mut profiles: Vec<profile::Curve> = self
-            .cases()
-            .filter(|c| c.renderer == "cpu" && c.rays == most(self.method(c)))
-            .filter_map(|c| {
-                let own = images.get(&c.id())?.as_ref().ok()?;
-                Some(profile::of_method(&c.estimator, &own.replicates, width as usize))
-            })
-            .collect();
-        let (judge, no_judge) = match judged {
-            Ok(judged) => {
-                brighter.insert(Judge::LABEL.to_owned(), judged.judge.brighter);
-                profiles.push(judged.curve);
-                (Some(judged.record), None)
-            }
-            Err(Absent(why)) => (None, Some(why)),
-        };
-        let radius = f64::from(self.scene.ao.radius);
-        Ok(SceneRecord {
-            name: self.scene.name.clone(),
-            description: self.scene.description.clone(),
-            control: self.scene.control,
-            hash: self.hash.clone(),
-            radius,
-            secondary_radius: f64::from(self.scene.ao.secondary_radius),
-            triangles: self.geometry.tracer.triangles().len(),
-            resolution: self.view.resolution,
-            transect: (0..width).map(|x| f64::from(self.scene.measure.transect_at(x)) / radius).collect(),
-            regions: Region::ALL.into_iter().map(|r| (r, self.regions.pixels(r).len())).collect(),
-            brighter,
-            judge,
-            screen: self.on_screen.as_ref().map(|s| s.record.clone()),
-            no_judge,
-            profiles,
-            image,
-            look,
-        })
-    }
 }
 
-fn measured<'a>(own: &'a Images, converged: &'a Converged, regions: &'a Regions) -> Measured<'a> {
-    Measured { replicates: &own.replicates, converged, regions }
+pub(super) fn measured<'a>(replicates: &'a [Vec<f32>], converged: &'a Converged, regions: &'a Regions) -> Measured<'a> {
+    Measured { replicates, converged, regions }
 }
 
 /// A flank that reaches the view's first or last column, and may go on beyond.

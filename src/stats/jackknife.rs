@@ -28,11 +28,24 @@ pub(super) fn column_means(rows: &Group) -> Vec<f64> {
 pub fn jackknife(groups: &[Group], f: impl Fn(&[Vec<f64>]) -> f64) -> Estimate {
     let mut means: Vec<Vec<f64>> = groups.iter().map(column_means).collect();
     let value = f(&means);
+    let without: Vec<Vec<f64>> = groups.iter().enumerate().map(|(g, rows)| left_out(rows, g, &mut means, &f)).collect();
+    jackknife_of(value, &without)
+}
+
+/// The same for any statistic: `value` is that of all replicates, `left_out` holds
+/// for each group its values with one replicate of that group left out.
+///
+/// ```
+/// use aogauge::stats::jackknife_of;
+/// // The mean of 1, 2 and 6.
+/// let e = jackknife_of(3.0, &[vec![4.0, 3.5, 1.5]]);
+/// assert!((e.se - (7.0f64 / 3.0).sqrt()).abs() < 1e-12 && e.df == 2.0);
+/// ```
+pub fn jackknife_of(value: f64, left_out: &[Vec<f64>]) -> Estimate {
     let (mut variance, mut welch) = (0.0, 0.0);
-    for (g, rows) in groups.iter().enumerate() {
-        let n = rows.len() as f64;
-        let left_out = left_out(rows, g, &mut means, &f);
-        let v = mean_variance(&left_out).1 * (n - 1.0).powi(2) / n;
+    for values in left_out {
+        let n = values.len() as f64;
+        let v = mean_variance(values).1 * (n - 1.0).powi(2) / n;
         variance += v;
         welch += v * v / (n - 1.0);
     }

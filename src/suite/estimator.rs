@@ -109,6 +109,12 @@ impl EstimatorFile {
         Ok((estimator, merged.rays))
     }
 
+    /// Whether the method works in screen space. A preset is none until it is built;
+    /// records hold methods as built.
+    pub fn is_screen_space(&self) -> bool {
+        matches!(self.kind, Some(Kind::Hbao | Kind::Gtao))
+    }
+
     /// The options of a method, without those that are as they would be anyway:
     /// what records and goldens know it by.
     pub fn of(estimator: &Estimator) -> EstimatorFile {

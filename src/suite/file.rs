@@ -166,7 +166,7 @@ impl GateFile {
         if self.known_failure.as_ref().is_some_and(|why| why.trim().is_empty()) {
             return Err("known_failure must say why it fails".into());
         }
-        if matches!(self.metric, MetricName::JudgeBias | MetricName::JudgeRmse) {
+        if matches!(self.metric, MetricName::JudgeBias | MetricName::JudgeMae | MetricName::JudgeRmse) {
             return Err(format!(
                 "{} is reported but never gated: it measures the direction of light more than AO; gate contrast-error",
                 self.metric.label()

@@ -270,6 +270,8 @@ mod tests {
             ("[[gate]]\nname = 'g'\nmetric = 'removed'\nmin = 0.5\nscenes = ['plan']", "'plan'"),
             ("[[gate]]\nname = 'g'\nmetric = 'bias'\nmax = 0.5", "region"),
             ("[[gate]]\nname = 'g'\nmetric = 'judge-bias'\nregion = 'left'\nmax = 0.5", "never gated"),
+            ("[[gate]]\nname = 'g'\nmetric = 'judge-mae'\nregion = 'left'\nmax = 0.5", "judge-mae is reported but"),
+            ("[[gate]]\nname = 'g'\nmetric = 'judge-rmse'\nregion = 'left'\nmax = 0.5", "judge-rmse is reported but"),
             ("[[gate]]\nname = 'g'\nmetric = 'removed'\nmin = nan", "finite"),
         ] {
             let message = with(extra).unwrap_err().to_string();
