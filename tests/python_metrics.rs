@@ -219,9 +219,9 @@ fn same_flip(images: &Pair<'_>, map: &[f32], theirs: &Value, name: &str, [means,
 }
 
 fn tell([means, exact, maps]: &[Held; 3], what: &str) {
-    means.tell(&format!("mean of {what}"));
+    means.tell(&format!("mean of {what} (what the peer rounds away included)"));
     exact.tell(&format!("mean of {what} against f64"));
-    maps.tell(&format!("map of {what}"));
+    maps.tell(&format!("map of {what} (what the peer rounds away included)"));
 }
 
 #[test]
