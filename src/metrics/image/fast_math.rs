@@ -33,7 +33,7 @@ fn exp2(x: f32) -> f32 {
 }
 
 /// x^p for x of 0 or more and 0 < p <= 4; 0 for 0 and for what is below the
-/// smallest normal number. Relative error below 2e-6 where x^p is within 1e-12 to 1e6
+/// smallest normal number. Relative error below 3e-6 where x^p is within 1e-12 to 1e6
 /// (tested); it grows with |p log2 x|.
 #[inline(always)]
 pub(super) fn pow(x: f32, p: f32) -> f32 {
@@ -80,7 +80,7 @@ mod tests {
         for p in [0.1f32, 0.5, 0.7, 1.0, 2.4] {
             let (from, to) = (1e-12f32.powf(1.0 / p).max(1e-12), 1e6f32.powf(1.0 / p).min(1e6));
             let error = worst(|x| pow(x, p), |x| x.powf(f64::from(p)), from, to);
-            assert!(error < 2e-6, "x^{p}: {error:e}");
+            assert!(error < 3e-6, "x^{p}: {error:e}");
         }
         assert_eq!(pow(0.0, 0.7), 0.0);
         assert_eq!(pow(1e-40, 0.7), 0.0);
