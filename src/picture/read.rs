@@ -240,6 +240,7 @@ fn decode_dynamic(path: &Path, bytes: &[u8]) -> Result<DynamicImage, DiskError> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layers::Layers;
     use image::{ImageBuffer, Luma, Rgb, Rgba};
 
     #[test]
