@@ -1,5 +1,5 @@
-//! What image metrics see and what they miss: one picture, distorted in eight ways,
-//! each to the same root mean squared error, and all scores beside each other.
+//! What image metrics see and what they miss: one picture, distorted in seven ways to
+//! the same root mean squared error, that of classic AO, and all scores beside each other.
 //!
 //! `cargo run --release --example metric_gallery -- docs/metrics` writes the
 //! pictures of docs/metrics.md there and prints its table.
@@ -23,8 +23,6 @@ use aogauge::{
 };
 use std::{error::Error, path::Path};
 
-/// What every distortion is tuned to.
-const RMSE: f64 = 0.03;
 const RAYS: u32 = 1024;
 const SCENE: &str = "curtain-arcade";
 
@@ -54,21 +52,25 @@ impl Seen {
         [self.width, self.extended.len() / self.width]
     }
 
-    /// The pixel some columns to the left, or the first of its row.
-    fn left_of(&self, i: usize, columns: usize) -> f32 {
-        self.extended[i - (i % self.width).min(columns)]
+    /// The image moved to the right by columns and parts of them.
+    fn moved(&self, i: usize, columns: f32) -> f32 {
+        let whole = columns.floor() as usize;
+        let at = |columns: usize| self.extended[i - (i % self.width).min(columns)];
+        at(whole) + columns.fract() * (at(whole + 1) - at(whole))
     }
 
-    /// The mean about a pixel, over numbers alone.
-    fn blurred(&self, i: usize) -> f32 {
-        let ([width, height], reach) = (self.size(), 3);
+    /// A Gaussian about a pixel, over numbers alone.
+    fn blurred(&self, i: usize, deviation: f32) -> f32 {
+        let ([width, height], reach) = (self.size(), (3.0 * deviation).ceil() as usize);
         let (x, y) = (i % width, i / width);
         let (mut sum, mut n) = (0.0, 0.0);
         for row in y.saturating_sub(reach)..=(y + reach).min(height - 1) {
             for column in x.saturating_sub(reach)..=(x + reach).min(width - 1) {
                 let v = self.extended[row * width + column];
                 if v.is_finite() {
-                    (sum, n) = (sum + v, n + 1.0);
+                    let distance = (column as f32 - x as f32).powi(2) + (row as f32 - y as f32).powi(2);
+                    let weight = (-0.5 * distance / (deviation * deviation).max(1e-6)).exp();
+                    (sum, n) = (sum + weight * v, n + weight);
                 }
             }
         }
@@ -105,24 +107,9 @@ const DISTORTIONS: [Distortion; 7] = [
         most: 1.0,
         at: |s, i, a| if uniform(i) < a * 0.2 { 1.0 } else { s.extended[i] },
     },
-    Distortion {
-        name: "blur",
-        cause: "a denoiser",
-        most: 6.0,
-        at: |s, i, a| s.extended[i] + a * (s.blurred(i) - s.extended[i]),
-    },
-    Distortion {
-        name: "shift",
-        cause: "half a pixel of jitter, a wrong projection",
-        most: 3.0,
-        at: |s, i, a| s.extended[i] + a * (s.left_of(i, 1) - s.extended[i]),
-    },
-    Distortion {
-        name: "highlight",
-        cause: "thin occluders ignored",
-        most: 3.0,
-        at: |s, i, a| s.extended[i] + a * (s.classic[i] - s.extended[i]),
-    },
+    Distortion { name: "blur", cause: "a denoiser", most: 8.0, at: Seen::blurred },
+    Distortion { name: "shift", cause: "a wrong projection", most: 16.0, at: Seen::moved },
+    Distortion { name: "highlight", cause: "classic AO", most: 1.0, at: |s, i, _| s.classic[i] },
 ];
 
 fn uniform(pixel: usize) -> f32 {
@@ -134,18 +121,18 @@ impl Distortion {
         (0..seen.extended.len()).map(|i| (self.at)(seen, i, amount)).collect()
     }
 
-    /// The amount that makes the error of all.
+    /// The amount that makes an error as large as that of classic AO.
     fn amount(&self, seen: &Seen) -> f32 {
-        let rmse = |amount: f32| {
-            let image = self.image(seen, amount);
+        let rmse = |image: &[f32]| {
             let squares = image.iter().zip(&seen.extended).map(|(a, b)| f64::from(a - b).powi(2));
             let squares: Vec<f64> = squares.filter(|d| d.is_finite()).collect();
             (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
         };
+        let wanted = rmse(&seen.classic);
         let (mut low, mut high) = (0.0, self.most);
-        for _ in 0..40 {
+        for _ in 0..24 {
             let middle = 0.5 * (low + high);
-            if rmse(middle) < RMSE { low = middle } else { high = middle }
+            if rmse(&self.image(seen, middle)) < wanted { low = middle } else { high = middle }
         }
         0.5 * (low + high)
     }
@@ -203,7 +190,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let reference = grey(&look, &look.extended)?;
     picture(&look, &look.extended, &out.join("reference.png"))?;
 
-    let mut rows: Vec<(&Distortion, Scores, f64)> = Vec::new();
+    let mut rows: Vec<(&Distortion, f32, Scores, f64)> = Vec::new();
     for distortion in &DISTORTIONS {
         let amount = distortion.amount(&look);
         let image = distortion.image(&look, amount);
@@ -212,22 +199,26 @@ fn main() -> Result<(), Box<dyn Error>> {
             scores(&Pair::new(&reference, &test, None)?, &Options { ssimulacra2: true, ..Options::default() })?;
         write_pictures(&look, distortion.name, &image, maps, out)?;
         let under = distortion.image(&measure, amount);
-        rows.push((distortion, found, contrast_error(&regions, &measure, &under)?));
+        rows.push((distortion, amount, found, contrast_error(&regions, &measure, &under)?));
     }
-    let names: Vec<ScoreName> = rows[0].1.scores.iter().map(|s| s.name).collect();
+    let names: Vec<ScoreName> = rows[0].2.scores.iter().map(|s| s.name).collect();
     let mut text = String::from("| |");
     for (distortion, ..) in &rows {
         text += &format!(" **{}**: {} |", distortion.name, distortion.cause);
     }
     text += &format!("\n|---|{}", "--:|".repeat(rows.len()));
+    text += "\n| amount |";
+    for (_, amount, ..) in &rows {
+        text += &format!(" {amount:.3} |");
+    }
     for name in names {
         text += &format!("\n| {} |", name.label());
-        for (_, found, _) in &rows {
+        for (_, _, found, _) in &rows {
             text += &found.value(name).map_or_else(|| " – |".to_owned(), |v| format!(" {v:.4} |"));
         }
     }
     text += "\n| dK against the reference |";
-    for (_, _, error) in &rows {
+    for (_, _, _, error) in &rows {
         text += &format!(" {error:+.4} |");
     }
     use std::io::Write;

@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod cli;
+pub mod compare;
 pub mod disk;
 pub mod flatland;
 pub mod gate;

@@ -23,8 +23,13 @@ fn json(output: &Output) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-fn value(scores: &Value, name: &str) -> f64 {
-    scores["scores"].as_array().unwrap().iter().find(|s| s["name"] == name).unwrap()["value"].as_f64().unwrap()
+/// What `--format json` says of the one pair.
+fn pair(output: &Output) -> Value {
+    json(output)["pairs"][0].take()
+}
+
+fn value(pair: &Value, name: &str) -> f64 {
+    pair["scores"]["scores"].as_array().unwrap().iter().find(|s| s["name"] == name).unwrap()["value"].as_f64().unwrap()
 }
 
 /// Two pictures that differ by 0.2 in the left half.
@@ -45,26 +50,121 @@ fn every_metric_is_printed_and_masks_weigh() {
     }
     assert!(table.contains("40 x 30 pixels, 3 channels, srgb"), "{table}");
     assert!(table.contains("the shorter side is 30, it must be 176 pixels or more for MS-SSIM"), "{table}");
-    let scores = json(&compare(folder.path(), &["a.png", "b.png", "--format", "json"]));
+    let scores = pair(&compare(folder.path(), &["a.png", "b.png", "--format", "json"]));
     assert!((value(&scores, "mae") - 0.1).abs() < 1e-7 && (value(&scores, "psnr") - 16.9897).abs() < 1e-4);
 
     image::GrayImage::from_fn(40, 30, |x, _| Luma([if x < 10 { 255 } else { 0 }]))
         .save(folder.path().join("m.png"))
         .unwrap();
-    let masked = json(&compare(folder.path(), &["a.png", "b.png", "--mask", "m.png", "--format", "json"]));
+    let masked = pair(&compare(folder.path(), &["a.png", "b.png", "--mask", "m.png", "--format", "json"]));
     assert!((value(&masked, "mae") - 0.2).abs() < 1e-7);
-    assert_eq!(masked["weight"], 300.0);
+    assert_eq!(masked["scores"]["weight"], 300.0);
 }
 
 #[test]
 fn what_the_numbers_stand_for_decides_flip_alone() {
     let folder = tempfile::tempdir().unwrap();
     pictures(folder.path());
-    let codes = json(&compare(folder.path(), &["a.png", "b.png", "--format", "json"]));
-    let linear = json(&compare(folder.path(), &["a.png", "b.png", "--encoding", "linear", "--format", "json"]));
+    let codes = pair(&compare(folder.path(), &["a.png", "b.png", "--format", "json"]));
+    let linear = pair(&compare(folder.path(), &["a.png", "b.png", "--encoding", "linear", "--format", "json"]));
     assert_eq!(value(&codes, "ssim"), value(&linear, "ssim"));
     assert!((value(&codes, "flip") - value(&linear, "flip")).abs() > 0.01);
-    assert_eq!((codes["encoding"].as_str(), linear["encoding"].as_str()), (Some("srgb"), Some("linear")));
+    assert_eq!(
+        (codes["scores"]["encoding"].as_str(), linear["scores"]["encoding"].as_str()),
+        (Some("srgb"), Some("linear"))
+    );
+}
+
+#[test]
+fn regions_are_a_product_and_a_crop_cuts() {
+    let folder = tempfile::tempdir().unwrap();
+    pictures(folder.path());
+    image::GrayImage::from_fn(40, 30, |_, y| Luma([if y < 15 { 255 } else { 0 }]))
+        .save(folder.path().join("m.png"))
+        .unwrap();
+    let found =
+        |args: &[&str]| pair(&compare(folder.path(), &[&["a.png", "b.png", "--format", "json"], args].concat()));
+    let left = found(&["--only", "0,0,20,30", "--ignore", "0,0,10,30", "--mask", "m.png"]);
+    assert_eq!((left["scores"]["weight"].as_f64(), left["exact"]["pixels"].as_u64()), (Some(150.0), Some(150)));
+    assert!((value(&left, "mae") - 0.2).abs() < 1e-7);
+    let crop = found(&["--crop", "10,5,20,12", "--ignore", "0,0,15,30"]);
+    assert_eq!(crop["scores"]["size"], serde_json::json!([20, 12]));
+    assert_eq!((crop["exact"]["pixels"].as_u64(), crop["exact"]["share"].as_f64()), (Some(180), Some(1.0 / 3.0)));
+    assert_eq!(crop["exact"]["first"], serde_json::json!([15, 5]));
+    let exact = found(&["--exact", "--crop", "10,5,20,12", "--ignore", "0,0,15,30"]);
+    assert_eq!(exact["exact"]["share"], crop["exact"]["share"]);
+    assert_eq!(exact["exact"]["first"], crop["exact"]["first"]);
+    // A mask is a layer of an OpenEXR file too.
+    let weights = (0..1200).map(|i| if i % 40 < 10 { 1.0 } else { 0.0 }).collect();
+    Layers::new([40, 30]).with("left", weights).write(&folder.path().join("regions.exr")).unwrap();
+    assert_eq!(found(&["--mask", "regions.exr:left"])["scores"]["weight"], 300.0);
+}
+
+#[test]
+fn the_exact_mode_counts_codes() {
+    let folder = tempfile::tempdir().unwrap();
+    pictures(folder.path());
+    let found = |args: &[&str]| pair(&compare(folder.path(), &[args, &["--exact", "--format", "json"]].concat()));
+    let all = found(&["a.png", "b.png"]);
+    assert_eq!((all["outcome"].as_str(), all["exact"]["differing"].as_u64()), (Some("measured"), Some(600)));
+    assert_eq!(all["exact"]["largest"], 51.0 / 255.0);
+    assert_eq!(found(&["a.png", "b.png", "--tolerance", "51/255"])["exact"]["differing"], 0);
+    assert_eq!(found(&["a.png", "b.png", "--tolerance", "50/255"])["exact"]["differing"], 600);
+    // The metrics see the same.
+    let floats = pair(&compare(folder.path(), &["a.png", "b.png", "--tolerance", "51/255", "--format", "json"]));
+    assert_eq!(floats["exact"]["differing"], 0);
+    std::fs::copy(folder.path().join("a.png"), folder.path().join("c.png")).unwrap();
+    assert_eq!(found(&["a.png", "c.png"])["exact"]["identical_files"], true);
+    let table = text(&compare(folder.path(), &["a.png", "c.png", "--exact"]).stdout);
+    assert_eq!(table, "identical files: 40 x 30 pixels, none differs\n");
+    // Other bytes, the same pixels, 16 bits.
+    image::open(folder.path().join("a.png")).unwrap().to_rgb16().save(folder.path().join("wide.png")).unwrap();
+    let wide = found(&["a.png", "wide.png"]);
+    assert_eq!(
+        (wide["exact"]["identical_files"].as_bool(), wide["exact"]["differing"].as_u64()),
+        (Some(false), Some(0))
+    );
+}
+
+#[test]
+fn every_layer_is_a_row() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, depth: f32, extra: &str| {
+        let layers = ["R", "G", "B", "depth", extra]
+            .iter()
+            .fold(Layers::new([20, 20]), |l, n| l.with(n, vec![if *n == "depth" { depth } else { 0.5 }; 400]));
+        layers.write(&folder.path().join(name)).unwrap();
+    };
+    file("a.exr", 0.25, "old");
+    file("b.exr", 0.75, "fresh");
+    let out = compare(folder.path(), &["a.exr", "b.exr", "--all-layers", "--format", "json", "--fail", "mae<=0.1"]);
+    assert_eq!(out.status.code(), Some(2), "a layer in one file only is an error");
+    let found: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let rows: Vec<_> = found["pairs"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|p| (p["layer"].as_str().unwrap(), p["outcome"].as_str().unwrap()))
+        .collect();
+    assert_eq!(rows, [("RGB", "pass"), ("depth", "fail"), ("old", "error"), ("fresh", "error")]);
+    assert!(found["pairs"][2]["reason"].as_str().unwrap().contains("the layer is in a.exr alone"));
+    let exact = compare(folder.path(), &["a.exr", "b.exr", "--all-layers", "--exact", "--maps", "m"]);
+    assert_eq!(exact.status.code(), Some(2));
+    let exact = compare(folder.path(), &["a.exr", "b.exr", "--layer", "depth", "--exact", "--format", "json"]);
+    assert_eq!(pair(&exact)["exact"]["differing"], 400);
+}
+
+#[test]
+fn one_picture_shows_both_images_and_the_map() {
+    let folder = tempfile::tempdir().unwrap();
+    pictures(folder.path());
+    let out = compare(folder.path(), &["a.png", "b.png", "--diff", "out/d.png"]);
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+    let picture = image::open(folder.path().join("out/d.png")).unwrap().to_rgb8();
+    assert!(picture.width() > 1500 && picture.height() > 390);
+    for code in [102u8, 153] {
+        assert!(picture.pixels().any(|p| p.0 == [code; 3]), "{code}");
+    }
 }
 
 #[test]
@@ -94,9 +194,12 @@ fn nan_is_counted_and_told() {
     write("a.exr", vec![0.5, f32::NAN, 0.5, f32::NAN]);
     write("b.exr", vec![0.5, f32::NAN, f32::INFINITY, 0.25]);
     let out = compare(folder.path(), &["a.exr", "b.exr", "--format", "json"]);
-    let scores = json(&out);
-    assert_eq!(scores["non_finite"], serde_json::json!({ "reference": 1, "test": 1, "both": 1 }));
-    assert_eq!((value(&scores, "mae"), scores["weight"].as_f64()), (0.0, Some(1.0)));
+    // A number against none is a fault, with and without limits.
+    assert_eq!(out.status.code(), Some(1));
+    let scores: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let scores = scores["pairs"][0].clone();
+    assert_eq!(scores["scores"]["non_finite"], serde_json::json!({ "reference": 1, "test": 1, "both": 1 }));
+    assert_eq!((value(&scores, "mae"), scores["scores"]["weight"].as_f64()), (0.0, Some(1.0)));
     assert!(text(&out.stderr).contains("1 pixels of the reference alone, 1 of the test image alone and 1 of both"));
 }
 
@@ -112,11 +215,27 @@ fn mistakes_end_with_2_and_a_sentence() {
         (&["a.png", "words.png"], "words.png: not a readable image"),
         (&["a.png", "small.png"], "40 x 30 pixels, the test image 8 x 9"),
         (&["a.png", "grey.png"], "the reference has 3, the test image 1"),
-        (&["a.png", "b.png", "--mask", "small.png"], "the mask has 72 values, the images have 1200 pixels"),
+        (&["a.png", "b.png", "--mask", "small.png"], "the mask has 8 x 9 pixels, the images have 40 x 30"),
         (&["a.png", "b.png", "--mask", "grey.png"], "1200 are masked"),
         (&["a.png", "b.png", "--ppd", "0"], "pixels per degree is 0, it must be 1 to 1000"),
         (&["a.png", "b.png", "--layer", "mean"], "only OpenEXR images have layers"),
         (&["a.png", "b.png", "--maps", "m", "--scale=-1"], "scale"),
+        (&["a.png", "b.png", "--fail", "flap<=1"], "there is no 'flap'"),
+        (&["a.png", "b.png", "--fail", "ssimulacra2>=90"], "reported and has no limit"),
+        (
+            &["a.png", "b.png", "--exact", "--fail", "flip<=1"],
+            "--exact computes differing and largest-difference alone",
+        ),
+        (&["a.png", "b.png", "--exact", "--maps", "m"], "cannot be used with"),
+        (&["a.png", "b.png", "--tolerance", "2"], "not within 0 to 1"),
+        (&["a.png", "b.png", "--ignore", "1,2,3"], "is no rectangle"),
+        (&["a.png", "b.png", "--ignore", "30,0,11,1"], "--ignore 30,0,11,1 reaches beyond the image of 40 x 30 pixels"),
+        (&["a.png", "a.png", "--exact", "--crop", "0,0,1,31"], "--crop 0,0,1,31 reaches beyond"),
+        (&["a.png", "b.png", "--limits", "none.toml"], "none.toml: cannot read the file"),
+        (&["a.png", "small.png", "--exact"], "40 x 30 pixels, the test image 8 x 9"),
+        (&["a.png", "grey.png", "--exact"], "the reference has 3, the test image 1"),
+        (&["words.png", "words.png", "--exact"], "words.png: not a readable image"),
+        (&["a.png", "."], ". is a folder and a.png is none"),
     ] {
         let out = compare(folder.path(), args);
         assert_eq!(out.status.code(), Some(2), "{args:?}");
@@ -150,8 +269,8 @@ fn replicates_are_tested_at_three_scales() {
     record_image(&folder.path().join("same.exr"), 2, 0.0);
     record_image(&folder.path().join("brighter.exr"), 3, 0.05);
     let rejected = |test: &str| -> Vec<usize> {
-        let found = json(&compare(folder.path(), &["a.exr", test, "--format", "json", "--maps", "maps"]));
-        found["welch"].as_array().unwrap().iter().map(|s| s["rejected"].as_array().unwrap().len()).collect()
+        let found = pair(&compare(folder.path(), &["a.exr", test, "--format", "json", "--maps", "maps"]));
+        found["welch"]["scales"].as_array().unwrap().iter().map(|s| s["rejected"].as_array().unwrap().len()).collect()
     };
     assert_eq!(rejected("same.exr"), [0, 0, 0]);
     let [_, tiles, image] = rejected("brighter.exr")[..] else { panic!("three scales") };
@@ -160,5 +279,41 @@ fn replicates_are_tested_at_three_scales() {
     assert!(maps.get("p-value").unwrap().iter().all(|p| (0.0..=1.0).contains(p)));
     let table = text(&compare(folder.path(), &["a.exr", "brighter.exr"]).stdout);
     assert!(table.contains("surest at 0, 0 (16 x 16): bias +0.0"), "{table}");
-    assert!(table.contains("would have been found"), "{table}");
+    assert!(table.contains("would have been found") && table.contains("95 % interval +0.0"), "{table}");
+}
+
+/// Openness of binary rays, near 1, with 4 rays on one side and 32 on the other: no
+/// more rejections than the family error allows. Seeds are fixed.
+#[test]
+fn unequal_rays_do_not_reject() {
+    let folder = tempfile::tempdir().unwrap();
+    let openness = |name: &str, seed: u32, rays: u32, told: bool| {
+        let mut x = seed;
+        let mut layers = Layers::new([48, 48]);
+        for replicate in 0..16 {
+            let mut pixel = || {
+                let open = (0..rays).filter(|_| {
+                    x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                    f64::from(x >> 8) / 16_777_216.0 < 0.97
+                });
+                open.count() as f32 / rays as f32
+            };
+            layers = layers.with(&format!("replicate-{replicate:04}"), (0..48 * 48).map(|_| pixel()).collect());
+        }
+        let mean = vec![0.97; 48 * 48];
+        layers = layers.with("mean", mean);
+        if told {
+            layers.attributes.insert("rays".into(), rays.to_string());
+        }
+        layers.write(&folder.path().join(name)).unwrap();
+    };
+    for (told, seed) in [(true, 1), (false, 2), (true, 3), (false, 4)] {
+        openness("few.exr", seed, 4, told);
+        openness("many.exr", seed + 10, 32, told);
+        let found = pair(&compare(folder.path(), &["few.exr", "many.exr", "--format", "json"]));
+        for scale in found["welch"]["scales"].as_array().unwrap() {
+            assert_eq!(scale["rejected"].as_array().unwrap().len(), 0, "seed {seed}: {scale}");
+            assert!(scale["detectable"].as_f64().unwrap() > 0.0);
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! `aogauge schema`
 
 use super::{Exit, Failure, json, print};
-use crate::{bench::GpuBench, flatland::Study, record::Record, scenes::Scene, suite::SuiteFile};
+use crate::{bench::GpuBench, compare::Comparison, flatland::Study, record::Record, scenes::Scene, suite::SuiteFile};
 use clap::ValueEnum;
 
 /// Print the JSON Schema of a format.
@@ -26,6 +26,8 @@ enum Of {
     Flatland,
     /// bench.json
     Bench,
+    /// What `compare --format json` prints.
+    Compare,
 }
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
@@ -34,6 +36,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
         Of::Suite => schemars::schema_for!(SuiteFile),
         Of::Scene => Scene::file_schema(),
         Of::Flatland => schemars::schema_for!(Study),
+        Of::Compare => schemars::schema_for!(Comparison),
         Of::Bench => schemars::schema_for!(GpuBench),
     };
     print(&json(&schema)?)?;

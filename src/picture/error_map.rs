@@ -153,9 +153,8 @@ impl ErrorMap {
         let factor = self.factor();
         let shown = [width * factor, height * factor];
         let bar = shown[0].max(LEAST_BAR);
-        let size = lettering_size(bar);
-        let margin = (1.2 * size).ceil() as u32;
-        let head = if caption.title.is_empty() { 0 } else { (2.8 * size).ceil() as u32 };
+        let (size, margin, head) = self.layout();
+        let head = if caption.title.is_empty() { 0 } else { head };
         let gap = (1.2 * size).ceil() as u32;
         let tall = margin + head + shown[1] + gap + color_bar::height(size) + margin;
         let mut picture = RgbImage::from_pixel(bar + 2 * margin, tall, Rgb([255; 3]));
@@ -168,8 +167,14 @@ impl ErrorMap {
         picture
     }
 
+    /// Height of an x, the margin on all sides, and the room a title takes, pixels.
+    pub(super) fn layout(&self) -> (f32, u32, u32) {
+        let size = lettering_size((self.resolution[0] * self.factor()).max(LEAST_BAR));
+        (size, (1.2 * size).ceil() as u32, (2.8 * size).ceil() as u32)
+    }
+
     /// How much a map is magnified in its picture.
-    fn factor(&self) -> u32 {
+    pub(super) fn factor(&self) -> u32 {
         let [width, height] = self.resolution;
         LEAST_WIDTH.div_ceil(width).min(MOST_HEIGHT / height).max(1)
     }

@@ -6,6 +6,8 @@ pub mod color_bar;
 pub mod error_map;
 pub mod lettering;
 pub mod read;
+mod read_exr;
 pub mod scale;
+pub mod side_by_side;
 pub mod split;
 pub mod tone;

@@ -1,25 +1,46 @@
 //! Images of other programs: OpenEXR, PNG, JPEG, Radiance HDR and TIFF become
 //! planes of numbers with a stated encoding.
 
+use super::read_exr::{self, exr_size};
 use crate::{
     disk::DiskError,
-    layers::Layers,
     metrics::image::{Encoding, Image},
 };
 use image::{DynamicImage, ImageReader, Limits};
 use std::{
     fs::File,
-    io::{BufReader, Read, Seek},
+    io::{Cursor, Read},
     path::Path,
 };
 
 /// An image may be this wide and high, pixels.
-const MAX_SIDE: u32 = 65_536;
-/// What decoding may allocate, bytes: two 16-bit RGB images of 16,384 pixels a side.
+pub(super) const MAX_SIDE: u32 = 65_536;
+/// What a file and what decoding it may take, bytes: two 16-bit RGB images of
+/// 16,384 pixels a side.
 const MAX_BYTES: u64 = 3 << 30;
+/// What any file may decode to, bytes, however small it is.
+const MIN_BYTES: u64 = 16 << 20;
+/// More bytes of pixels than this for a byte of file is no honest compression:
+/// deflate ends at 1032.
+const MAX_RATIO: u64 = 2000;
 
 /// The first bytes of an OpenEXR file.
 const EXR: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+
+/// Extensions of the images that can be read, in lower case.
+pub const EXTENSIONS: [&str; 7] = ["exr", "png", "jpg", "jpeg", "hdr", "tif", "tiff"];
+
+/// Which layers of an OpenEXR file to take.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LayerChoice<'a> {
+    /// Of the first part: R, G and B, else Y, else `mean`, else the only channel.
+    #[default]
+    Main,
+    /// A channel, or three of them: `NAME.R`, `.G`, `.B`.
+    Named(&'a str),
+    /// Every layer of every part; three channels R, G and B are one.
+    All,
+}
 
 /// An image from a file, and the layer it was found in (empty where formats have
 /// none).
@@ -29,46 +50,90 @@ pub struct Found {
     pub image: Image,
     /// The layer of an OpenEXR file.
     pub layer: String,
+    /// Where the pixels begin: the corner of an OpenEXR data window, else 0, 0.
+    pub origin: [i32; 2],
+}
+
+/// The samples of an image as they are stored, channels of a pixel side by side.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Samples {
+    /// Width and height, pixels.
+    pub size: [usize; 2],
+    /// Channels a pixel, alpha among them.
+    pub channels: usize,
+    /// Row by row from the top left.
+    pub values: Values,
+}
+
+/// Stored numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Values {
+    /// 8-bit codes.
+    U8(Vec<u8>),
+    /// 16-bit codes.
+    U16(Vec<u16>),
+    /// Floats.
+    F32(Vec<f32>),
 }
 
 /// Reads an image; the format is told by its first bytes, then by its extension.
 ///
 /// Of an OpenEXR file `layer` names a channel, or three of them (`NAME.R`, `.G`,
-/// `.B`); without it: R, G and B, else Y, else `mean`, else the only channel. 8 and
-/// 16 bit values become 0 to 1. An alpha channel is left out. Without `encoding`,
-/// integers are sRGB codes and floats are linear.
+/// `.B`), with the name of its part before it where a file has several; without it:
+/// [`LayerChoice::Main`]. 8 and 16 bit values become 0 to 1. An alpha channel is left
+/// out. Without `encoding`, integers are sRGB codes and floats are linear.
 ///
 /// # Errors
 /// [`DiskError`] naming the file where it cannot be read or decoded, claims more
-/// than 65,536 pixels a side or 3 GiB, or has no such layer.
+/// than 65,536 pixels a side, 3 GiB or 2000 bytes for a byte of file, or has no such
+/// layer.
 pub fn read(path: &Path, layer: Option<&str>, encoding: Option<Encoding>) -> Result<Found, DiskError> {
-    let mut file = File::open(path).map_err(DiskError::io(path, "read the image"))?;
-    let mut magic = [0; 4];
-    // A file of fewer bytes is no image, as the decoder will say.
-    let is_exr = file.read_exact(&mut magic).is_ok() && magic == EXR;
-    if is_exr || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
-        return read_exr(path, layer, encoding);
-    }
-    if layer.is_some() {
-        return Err(DiskError::content(path, "only OpenEXR images have layers"));
-    }
-    file.rewind().map_err(DiskError::io(path, "read the image"))?;
-    decode(path, file, encoding)
+    let choice = layer.map_or(LayerChoice::Main, LayerChoice::Named);
+    let mut found = decode(path, &load(path)?, choice, encoding)?;
+    found.pop().ok_or_else(|| DiskError::content(path, "the image has no layer"))
 }
 
-fn decode(path: &Path, file: File, encoding: Option<Encoding>) -> Result<Found, DiskError> {
-    let broken = |e: &dyn std::fmt::Display| DiskError::content(path, format!("not a readable image: {e}"));
-    let mut reader = ImageReader::new(BufReader::new(file));
-    // The extension stands in where the first bytes say nothing.
-    if let Ok(format) = image::ImageFormat::from_path(path) {
-        reader.set_format(format);
+/// The bytes of an image file.
+///
+/// # Errors
+/// Where it cannot be read, is a Git LFS pointer or has more than 3 GiB.
+pub fn load(path: &Path) -> Result<Vec<u8>, DiskError> {
+    let file = File::open(path).map_err(DiskError::io(path, "read the image"))?;
+    let mut bytes = Vec::new();
+    if let Ok(length) = file.metadata().map(|m| m.len()) {
+        bytes.reserve(length.min(MAX_BYTES) as usize + 1);
     }
-    let mut reader = reader.with_guessed_format().map_err(|e| broken(&e))?;
-    let mut limits = Limits::default();
-    (limits.max_image_width, limits.max_image_height) = (Some(MAX_SIDE), Some(MAX_SIDE));
-    limits.max_alloc = Some(MAX_BYTES);
-    reader.limits(limits);
-    let decoded = reader.decode().map_err(|e| broken(&e))?;
+    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(DiskError::io(path, "read the image"))?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(DiskError::content(
+            path,
+            format!("more than {MAX_BYTES} bytes, which is the most an image may have"),
+        ));
+    }
+    if bytes.starts_with(b"version https://git-lfs") {
+        return Err(DiskError::content(path, "this is a Git LFS pointer, not the image: run `git lfs pull`"));
+    }
+    Ok(bytes)
+}
+
+/// Decodes the bytes of an image; `path` has the extension, and errors name it. One
+/// image, or with [`LayerChoice::All`] as many as there are layers.
+///
+/// # Errors
+/// As [`read`].
+pub fn decode(
+    path: &Path,
+    bytes: &[u8],
+    choice: LayerChoice<'_>,
+    encoding: Option<Encoding>,
+) -> Result<Vec<Found>, DiskError> {
+    if is_exr(path, bytes) {
+        return read_exr::decode(path, bytes, choice, encoding.unwrap_or(Encoding::Linear), most(bytes));
+    }
+    if matches!(choice, LayerChoice::Named(_)) {
+        return Err(DiskError::content(path, "only OpenEXR images have layers"));
+    }
+    let decoded = decode_dynamic(path, bytes)?;
     let floats = matches!(decoded, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_));
     let encoding = encoding.unwrap_or(if floats { Encoding::Linear } else { Encoding::Srgb });
     let size = [decoded.width() as usize, decoded.height() as usize];
@@ -78,44 +143,104 @@ fn decode(path: &Path, file: File, encoding: Option<Encoding>) -> Result<Found, 
     } else {
         vec![decoded.to_luma32f().into_raw()]
     };
-    let image = Image::new(size, planes, encoding).map_err(|e| broken(&e))?;
-    Ok(Found { image, layer: String::new() })
+    let image = Image::new(size, planes, encoding).map_err(|e| DiskError::content(path, e.to_string()))?;
+    Ok(vec![Found { image, layer: String::new(), origin: [0, 0] }])
 }
 
-fn read_exr(path: &Path, layer: Option<&str>, encoding: Option<Encoding>) -> Result<Found, DiskError> {
-    let mut layers = Layers::read(path)?;
-    let size = layers.resolution.map(|n| n as usize);
-    let names: Vec<String> = layers.layers.keys().cloned().collect();
-    let three = |prefix: &str| ["R", "G", "B"].map(|c| format!("{prefix}{c}"));
-    let has = |wanted: &[String]| wanted.iter().all(|w| names.contains(w));
-    let one = |name: &str| vec![name.to_owned()];
-    let wanted = match layer {
-        Some(name) if has(&three(&format!("{name}."))) => three(&format!("{name}.")).to_vec(),
-        Some(name) => one(name),
-        None if has(&three("")) => three("").to_vec(),
-        None => match ["Y", "mean"].into_iter().find(|n| has(&one(n))) {
-            Some(name) => one(name),
-            None if names.len() == 1 => names.clone(),
-            None => {
-                let why = format!("several layers, name one of them: {}", names.join(", "));
-                return Err(DiskError::content(path, why));
-            }
-        },
-    };
-    let planes: Vec<Vec<f32>> = wanted.iter().filter_map(|name| layers.layers.remove(name)).collect();
-    if planes.len() != wanted.len() {
-        let why = format!("no layer '{}'; there are: {}", layer.unwrap_or_default(), names.join(", "));
-        return Err(DiskError::content(path, why));
+/// Decodes the bytes of an image as they are stored. OpenEXR has layers, which
+/// [`decode`] knows.
+///
+/// # Errors
+/// As [`read`], and for OpenEXR.
+pub fn decode_samples(path: &Path, bytes: &[u8]) -> Result<Samples, DiskError> {
+    if is_exr(path, bytes) {
+        return Err(DiskError::content(path, "an OpenEXR image has layers, not samples"));
     }
-    let image = Image::new(size, planes, encoding.unwrap_or(Encoding::Linear))
-        .map_err(|e| DiskError::content(path, e.to_string()))?;
-    let layer = if wanted.len() == 1 { wanted[0].clone() } else { wanted[0].trim_end_matches('R').to_owned() + "RGB" };
-    Ok(Found { image, layer })
+    let decoded = decode_dynamic(path, bytes)?;
+    let size = [decoded.width() as usize, decoded.height() as usize];
+    let channels = usize::from(decoded.color().channel_count());
+    let values = match decoded {
+        DynamicImage::ImageLuma8(b) => Values::U8(b.into_raw()),
+        DynamicImage::ImageLumaA8(b) => Values::U8(b.into_raw()),
+        DynamicImage::ImageRgb8(b) => Values::U8(b.into_raw()),
+        DynamicImage::ImageRgba8(b) => Values::U8(b.into_raw()),
+        DynamicImage::ImageLuma16(b) => Values::U16(b.into_raw()),
+        DynamicImage::ImageLumaA16(b) => Values::U16(b.into_raw()),
+        DynamicImage::ImageRgb16(b) => Values::U16(b.into_raw()),
+        DynamicImage::ImageRgba16(b) => Values::U16(b.into_raw()),
+        DynamicImage::ImageRgb32F(b) => Values::F32(b.into_raw()),
+        DynamicImage::ImageRgba32F(b) => Values::F32(b.into_raw()),
+        other => {
+            let why = format!("samples of the kind {:?} cannot be compared", other.color());
+            return Err(DiskError::content(path, why));
+        }
+    };
+    Ok(Samples { size, channels, values })
+}
+
+/// Width and height by the header alone.
+///
+/// # Errors
+/// Where the header cannot be read.
+pub fn size(path: &Path, bytes: &[u8]) -> Result<[usize; 2], DiskError> {
+    if is_exr(path, bytes) {
+        return exr_size(path, bytes);
+    }
+    let (width, height) = reader(path, bytes)?.into_dimensions().map_err(|e| broken(path, &e))?;
+    Ok([width as usize, height as usize])
+}
+
+/// Whether the extension is one of an image that can be read.
+pub fn has_image_extension(path: &Path) -> bool {
+    path.extension().is_some_and(|e| EXTENSIONS.iter().any(|known| e.eq_ignore_ascii_case(known)))
+}
+
+/// Names of the channels of an OpenEXR file, as layers are called; none of others.
+///
+/// # Errors
+/// Where the header cannot be read.
+pub fn layer_names(path: &Path, bytes: &[u8]) -> Result<Vec<String>, DiskError> {
+    if is_exr(path, bytes) { read_exr::names(path, bytes) } else { Ok(Vec::new()) }
+}
+
+/// Whether the bytes are OpenEXR, or no format is known by them and the extension
+/// says so.
+pub fn is_exr(path: &Path, bytes: &[u8]) -> bool {
+    bytes.starts_with(&EXR)
+        || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) && image::guess_format(bytes).is_err()
+}
+
+/// How many bytes a file may decode to.
+fn most(bytes: &[u8]) -> u64 {
+    (bytes.len() as u64).saturating_mul(MAX_RATIO).clamp(MIN_BYTES, MAX_BYTES)
+}
+
+fn broken(path: &Path, e: &dyn std::fmt::Display) -> DiskError {
+    DiskError::content(path, format!("not a readable image: {e}"))
+}
+
+fn reader<'a>(path: &Path, bytes: &'a [u8]) -> Result<ImageReader<Cursor<&'a [u8]>>, DiskError> {
+    let mut reader = ImageReader::new(Cursor::new(bytes));
+    // The extension stands in where the first bytes say nothing.
+    if let Ok(format) = image::ImageFormat::from_path(path) {
+        reader.set_format(format);
+    }
+    let mut reader = reader.with_guessed_format().map_err(|e| broken(path, &e))?;
+    let mut limits = Limits::default();
+    (limits.max_image_width, limits.max_image_height) = (Some(MAX_SIDE), Some(MAX_SIDE));
+    limits.max_alloc = Some(most(bytes));
+    reader.limits(limits);
+    Ok(reader)
+}
+
+fn decode_dynamic(path: &Path, bytes: &[u8]) -> Result<DynamicImage, DiskError> {
+    reader(path, bytes)?.decode().map_err(|e| broken(path, &e))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layers::Layers;
     use image::{ImageBuffer, Luma, Rgb, Rgba};
 
     #[test]

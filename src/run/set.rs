@@ -333,6 +333,15 @@ impl<'a> Set<'a> {
         for (r, values) in replicates.iter().enumerate() {
             layers = layers.with(&format!("replicate-{r:04}"), values.clone());
         }
+        // What whoever compares the file alone must know.
+        let attributes = [
+            ("scene", case.scene.clone()),
+            ("estimator", case.estimator.clone()),
+            ("renderer", case.renderer.clone()),
+            ("rays", case.rays.to_string()),
+            ("seed", self.plan.seed.to_string()),
+        ];
+        layers.attributes.extend(attributes.map(|(name, text)| (name.to_owned(), text)));
         layers.write(&folder.path().join(&image))?;
         Ok((image, hash))
     }

@@ -3,6 +3,7 @@
 //! the whole image power and no place; tiles lie between.
 
 use super::{Estimate, normal_quantile, sidak_alpha, student::tails};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Edge of a tile, pixels.
@@ -15,7 +16,7 @@ pub const POWER: f64 = 0.8;
 const MEDIAN_OF: usize = 1024;
 
 /// The size of the places that one set of tests compares.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scale {
     /// Every pixel.
@@ -115,21 +116,23 @@ fn at_least(se: f64, floor: f64) -> f64 {
 }
 
 /// A test of one place.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Difference {
     /// Left, top, width and height in pixels.
     pub place: [u32; 4],
     /// Mean of the first image less mean of the second, over pixels known in both.
     pub bias: f64,
     /// Standard error of the bias.
+    #[schemars(with = "Option<f64>")]
     pub se: f64,
     /// Two-sided p-value; NaN where a standard error is: nothing vouches for such a
     /// place, so it counts as rejected.
+    #[schemars(with = "Option<f64>")]
     pub p: f64,
 }
 
 /// All tests of one scale.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ScaleTest {
     /// The scale.
     pub scale: Scale,
@@ -142,6 +145,7 @@ pub struct ScaleTest {
     /// The smallest bias of a place that would be found with probability [`POWER`],
     /// in the median place (of 1,024 evenly spaced ones where there are more); 0
     /// without places, infinite where errors are unknown.
+    #[schemars(with = "Option<f64>")]
     pub detectable: f64,
 }
 

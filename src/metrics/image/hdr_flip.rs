@@ -47,12 +47,14 @@ pub struct HdrFlip {
 }
 
 impl Exposures {
-    /// The exposures that the paper derives from a linear reference; None where it
+    /// The exposures that the paper derives from a linear reference, of the pixels
+    /// that have weight; None where it
     /// is black (a maximum of zero). A median below 2^-23 counts as 2^-23.
     pub fn of(pair: &Pair<'_>) -> Option<Exposures> {
         let image = pair.reference();
         let planes = image.planes();
         let mut luminances: Vec<f32> = (0..image.pixels())
+            .filter(|&i| pair.weight(i) > 0.0)
             .map(|i| match planes {
                 [red, green, blue] => 0.2126 * red[i] + 0.7152 * green[i] + 0.0722 * blue[i],
                 _ => planes[0][i],

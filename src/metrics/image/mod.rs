@@ -97,6 +97,14 @@ pub enum ImageError {
         /// Pixels of the images.
         pixels: usize,
     },
+    /// The mask is an image of another size.
+    #[error("the mask has {} x {} pixels, the images have {} x {}", mask[0], mask[1], image[0], image[1])]
+    MaskSize {
+        /// Of the mask.
+        mask: [usize; 2],
+        /// Of the images.
+        image: [usize; 2],
+    },
     /// A weight of the mask is no weight.
     #[error("the mask has the weight {weight} at pixel {pixel}; weights are 0 to 1")]
     Weight {

@@ -96,7 +96,7 @@ pub struct Score {
     pub name: ScoreName,
     /// The value; null where it is not defined or infinite.
     pub value: Option<f64>,
-    /// Why the value is null.
+    /// Why the value is null, or what it leaves out.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub note: Option<String>,
 }
@@ -157,7 +157,7 @@ pub struct Scores {
     pub exposures: Option<Exposures>,
     /// The metrics, in a fixed order.
     pub scores: Vec<Score>,
-    /// Summaries of the maps: `absolute`, `ssim`, `flip`, `hdr-flip`.
+    /// Summaries of the maps: `absolute`, `signed`, `ssim`, `flip`, `hdr-flip`.
     pub maps: BTreeMap<String, MapSummary>,
 }
 
@@ -175,19 +175,7 @@ impl Scores {
 /// (SSIM of an image smaller than its window) is a null with a reason, no error.
 pub fn scores(pair: &Pair<'_>, options: &Options) -> Result<(Scores, Maps), ImageError> {
     let image = pair.reference();
-    let mut all = Vec::new();
-    let point = pointwise(pair);
-    for (name, value) in [
-        (ScoreName::MeanError, point.mean_error),
-        (ScoreName::Mae, point.mae),
-        (ScoreName::Mse, point.mse),
-        (ScoreName::Rmse, point.rmse()),
-        (ScoreName::Psnr, point.psnr(1.0)),
-        (ScoreName::RelativeMse, point.relative_mse),
-        (ScoreName::Smape, point.smape),
-    ] {
-        all.push(score(name, Ok(value)));
-    }
+    let mut all = single_pixels(pair);
     let mut maps = Maps {
         absolute: absolute_map(pair),
         signed: signed_map(pair),
@@ -195,33 +183,19 @@ pub fn scores(pair: &Pair<'_>, options: &Options) -> Result<(Scores, Maps), Imag
         flip: flip(pair, options.ppd)?,
         hdr_flip: Vec::new(),
     };
-    match ssim(pair) {
-        Ok(finest) => {
-            all.push(score(ScoreName::Ssim, Ok(finest.mean)));
-            all.push(score(ScoreName::MsSsim, ms_ssim(pair, &finest).map_err(|e| absent(&e))));
-            maps.ssim = finest.map;
-        }
-        Err(e) => {
-            all.extend([ScoreName::Ssim, ScoreName::MsSsim].map(|name| score(name, Err(absent(&e)))));
-        }
-    }
+    all.extend(structure(pair, &mut maps));
     let mut exposures = None;
-    if options.hdr {
+    if options.hdr && image.encoding() == Encoding::Linear {
         exposures = options.exposures.or_else(|| Exposures::of(pair));
-        if let Some(exposures) = exposures.filter(|_| image.encoding() == Encoding::Linear) {
+        if let Some(exposures) = exposures {
             maps.hdr_flip = hdr_flip(pair, options.ppd, exposures)?.map;
         }
     }
-    let mut summaries = BTreeMap::new();
-    for (name, map) in
-        [("absolute", &maps.absolute), ("ssim", &maps.ssim), ("flip", &maps.flip), ("hdr-flip", &maps.hdr_flip)]
-    {
-        if let Some(found) = Some(map).filter(|m| !m.is_empty()).and_then(|m| summary(pair, m)) {
-            summaries.insert(name.to_owned(), found);
-        }
-    }
+    let summaries = summaries(pair, &maps);
     let mean = |map: &str, why: &str| summaries.get(map).map(|s| s.mean).ok_or_else(|| Absent(why.to_owned()));
-    all.push(score(ScoreName::Flip, mean("flip", "no pixel has weight")));
+    let mut flip = score(ScoreName::Flip, mean("flip", "no pixel has weight"));
+    flip.note = flip.note.or_else(|| clamped(pair));
+    all.push(flip);
     if options.hdr {
         let why = if image.encoding() == Encoding::Linear {
             "the reference is black"
@@ -248,6 +222,54 @@ pub fn scores(pair: &Pair<'_>, options: &Options) -> Result<(Scores, Maps), Imag
     Ok((scores, maps))
 }
 
+fn single_pixels(pair: &Pair<'_>) -> Vec<Score> {
+    let point = pointwise(pair);
+    let values = [
+        (ScoreName::MeanError, point.mean_error),
+        (ScoreName::Mae, point.mae),
+        (ScoreName::Mse, point.mse),
+        (ScoreName::Rmse, point.rmse()),
+        (ScoreName::Psnr, point.psnr(1.0)),
+        (ScoreName::RelativeMse, point.relative_mse),
+        (ScoreName::Smape, point.smape),
+    ];
+    values.map(|(name, value)| score(name, Ok(value))).to_vec()
+}
+
+fn structure(pair: &Pair<'_>, maps: &mut Maps) -> [Score; 2] {
+    match ssim(pair) {
+        Ok(finest) => {
+            let coarse = ms_ssim(pair, &finest).map_err(|e| absent(&e));
+            maps.ssim = finest.map;
+            [score(ScoreName::Ssim, Ok(finest.mean)), score(ScoreName::MsSsim, coarse)]
+        }
+        Err(e) => [ScoreName::Ssim, ScoreName::MsSsim].map(|name| score(name, Err(absent(&e)))),
+    }
+}
+
+fn summaries(pair: &Pair<'_>, maps: &Maps) -> BTreeMap<String, MapSummary> {
+    let named = [
+        ("absolute", &maps.absolute),
+        ("signed", &maps.signed),
+        ("ssim", &maps.ssim),
+        ("flip", &maps.flip),
+        ("hdr-flip", &maps.hdr_flip),
+    ];
+    let found = named.into_iter().filter(|(_, map)| !map.is_empty());
+    found.filter_map(|(name, map)| Some((name.to_owned(), summary(pair, map)?))).collect()
+}
+
+/// FLIP clamps to [0, 1], and so cannot tell what lies beyond.
+fn clamped(pair: &Pair<'_>) -> Option<String> {
+    let beyond = |i: usize| {
+        let mut values = [pair.reference(), pair.test()].into_iter().flat_map(super::Image::planes);
+        values.any(|plane| !(0.0..=1.0).contains(&plane[i]))
+    };
+    let pixels = pair.reference().pixels();
+    let n = (0..pixels).filter(|&i| pair.weight(i) > 0.0 && beyond(i)).count();
+    (n > 0).then(|| format!("{n} of {pixels} pixels lie beyond 0 to 1 and were clamped: see HDR-FLIP"))
+}
+
 fn absent(e: &ImageError) -> Absent {
     Absent(e.to_string())
 }
@@ -255,7 +277,7 @@ fn absent(e: &ImageError) -> Absent {
 fn score(name: ScoreName, value: Result<f64, Absent>) -> Score {
     match value {
         Ok(v) if v.is_finite() => Score { name, value: Some(v), note: None },
-        Ok(v) if v > 0.0 => Score { name, value: None, note: Some("infinite: the images are equal".to_owned()) },
+        Ok(v) if v > 0.0 => Score { name, value: None, note: Some("infinite: there is no error".to_owned()) },
         Ok(_) => Score { name, value: None, note: Some("not a finite number".to_owned()) },
         Err(Absent(why)) => Score { name, value: None, note: Some(why) },
     }

@@ -39,7 +39,8 @@ pub struct Ssim {
 
 /// Structural similarity in its canonical form: luma (the mean of the channels) of
 /// range 1, an 11 x 11 Gaussian window of deviation 1.5, K1 = 0.01, K2 = 0.03,
-/// biased variances, mean over the windows that fit.
+/// biased variances, mean over the windows that fit. It is blind to colour: images of
+/// one luma are equal.
 ///
 /// (2 m_r m_t + C1)(2 s_rt + C2) / ((m_r^2 + m_t^2 + C1)(s_r^2 + s_t^2 + C2)).
 /// Wang, Bovik, Sheikh, Simoncelli: Image Quality Assessment, 2004. Higher is

@@ -1,0 +1,246 @@
+//! `aogauge compare`
+
+mod table;
+
+use super::{Exit, Failure, Format, json, print, run::bar, tell};
+use crate::{
+    compare::{
+        CompareError, Drawn, Layer, Limit, Limits, Mask, Mode, Outcome, PairReport, Rect, Region, Settings, compare,
+        side_by_side, write_maps,
+    },
+    layers::write_png,
+    metrics::image::{DEFAULT_PPD, Encoding, Options},
+    run::Observer,
+};
+use clap::ValueEnum;
+use std::path::{Path, PathBuf};
+
+/// Compare an image, or a folder of images, with a reference of the same view.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  aogauge compare reference.png test.png\n  \
+aogauge compare references/ renders/ --fail 'flip<=0.05' --fail 'ssim>=0.98' --warn 'flip.p99<=0.2'\n  \
+aogauge compare references/ renders/ --limits limits.toml --maps maps --format json > compare.json\n  \
+aogauge compare a.png b.png --exact --fail 'differing<=0'\n  \
+aogauge compare a.exr b.exr --all-layers --ignore 0,0,320,40 --diff diff.png\n\n\
+OpenEXR, PNG, JPEG, Radiance HDR and TIFF. docs/compare.md tells how to use it in CI, docs/metrics.md what each\n\
+metric sees and misses. Limits are on mean-error, mae, mse, rmse, psnr, relative-mse, smape, ssim, ms-ssim, flip,\n\
+hdr-flip, differing, largest-difference, and on STATISTICS of maps: absolute, ssim, flip, hdr-flip, such as flip.p99\n\
+(mean, min, median, p95, p99, max).\n\
+Exit codes: 0 pass or only warnings, 1 a limit is broken or an image is missing, 2 wrong usage or a pair that cannot\n\
+be compared, 4 no image to compare, 6 a metric under a limit has no value.")]
+pub struct Args {
+    /// What to compare with: an image, or a folder of images.
+    reference: PathBuf,
+    /// What is compared: an image, or a folder with images of the same relative paths.
+    test: PathBuf,
+    /// The pixel-exact metric alone: how many pixels differ, and by how much. Fast.
+    #[arg(long, conflicts_with_all = ["maps", "diff", "hdr", "ssimulacra2"])]
+    exact: bool,
+    /// A pixel differs where a channel does by more than this, of a range of 0 to 1;
+    /// may be a fraction, such as 2/255.
+    #[arg(long, default_value = "0", value_parser = tolerance)]
+    tolerance: f64,
+    /// A limit whose breach fails, NAME<=VALUE or NAME>=VALUE; may be repeated.
+    #[arg(long, value_name = "LIMIT")]
+    fail: Vec<Limit>,
+    /// A limit whose breach is told and passes; may be repeated.
+    #[arg(long, value_name = "LIMIT")]
+    warn: Vec<Limit>,
+    /// A TOML file of limits, with overrides for some paths.
+    #[arg(long, value_name = "FILE")]
+    limits: Option<PathBuf>,
+    /// Images that the test folder lacks do not fail.
+    #[arg(long)]
+    allow_missing: bool,
+    /// The layer of OpenEXR images; R, G and B, else Y, else mean unless given.
+    #[arg(long, conflicts_with = "all_layers")]
+    layer: Option<String>,
+    /// Every layer of OpenEXR images, each for itself.
+    #[arg(long)]
+    all_layers: bool,
+    /// What the numbers stand for; integers are sRGB codes and floats linear unless given.
+    #[arg(long, value_enum)]
+    encoding: Option<Meaning>,
+    /// An image that weighs pixels, black 0 and white 1: FILE, FILE.exr:LAYER, or a
+    /// folder of such images with the relative paths of those compared.
+    #[arg(long)]
+    mask: Option<String>,
+    /// A rectangle that does not count: x,y,width,height; may be repeated.
+    #[arg(long, value_name = "RECT")]
+    ignore: Vec<Rect>,
+    /// A rectangle outside which nothing counts; may be repeated.
+    #[arg(long, value_name = "RECT")]
+    only: Vec<Rect>,
+    /// The rectangle of both images that is compared.
+    #[arg(long, value_name = "RECT")]
+    crop: Option<Rect>,
+    /// Pixels per degree for FLIP.
+    #[arg(long, default_value_t = DEFAULT_PPD)]
+    ppd: f64,
+    /// HDR-FLIP too: linear images beyond 0 to 1. It costs a FLIP an exposure.
+    #[arg(long)]
+    hdr: bool,
+    /// SSIMULACRA2 too. It costs several times the rest.
+    #[arg(long)]
+    ssimulacra2: bool,
+    /// Folder for error maps: pictures with their scale, maps.exr with the numbers, and
+    /// side-by-side.png; of folders, a folder an image.
+    #[arg(long, value_name = "DIR")]
+    maps: Option<PathBuf>,
+    /// One picture: reference, test image, FLIP map. Of two images.
+    #[arg(long, value_name = "FILE.png")]
+    diff: Option<PathBuf>,
+    /// Where the scales of the absolute and the signed map end.
+    #[arg(long, default_value_t = 0.25, requires = "maps")]
+    scale: f64,
+    /// What is printed on standard output.
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+/// `--encoding`
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Meaning {
+    /// Linear light or openness.
+    Linear,
+    /// sRGB codes.
+    Srgb,
+}
+
+impl From<Meaning> for Encoding {
+    fn from(m: Meaning) -> Self {
+        match m {
+            Meaning::Linear => Encoding::Linear,
+            Meaning::Srgb => Encoding::Srgb,
+        }
+    }
+}
+
+impl From<CompareError> for Failure {
+    fn from(e: CompareError) -> Self {
+        Failure::usage(e.to_string())
+    }
+}
+
+/// A number, or one over another.
+fn tolerance(text: &str) -> Result<f64, String> {
+    let number = |t: &str| t.trim().parse::<f64>().map_err(|_| format!("'{text}' is no number and no fraction"));
+    let value = match text.split_once('/') {
+        Some((a, b)) => number(a)? / number(b)?,
+        None => number(text)?,
+    };
+    if (0.0..=1.0).contains(&value) { Ok(value) } else { Err(format!("'{text}' is not within 0 to 1")) }
+}
+
+impl Args {
+    fn settings(&self) -> Result<Settings, Failure> {
+        let limits = self.limits.as_deref().map(Limits::load).transpose()?.unwrap_or_default();
+        let layer = match &self.layer {
+            Some(name) => Layer::Named(name.clone()),
+            None if self.all_layers => Layer::All,
+            None => Layer::Main,
+        };
+        Ok(Settings {
+            mode: if self.exact { Mode::Exact } else { Mode::Metrics },
+            options: Options { ppd: self.ppd, hdr: self.hdr, exposures: None, ssimulacra2: self.ssimulacra2 },
+            layer,
+            encoding: self.encoding.map(Encoding::from),
+            mask: self.mask.as_deref().map(Mask::parse),
+            region: Region { ignore: self.ignore.clone(), only: self.only.clone(), crop: self.crop },
+            tolerance: self.tolerance,
+            limits: limits.and(self.fail.clone(), self.warn.clone()),
+            allow_missing: self.allow_missing,
+        })
+    }
+
+    /// Of folders, maps lie in a folder an image; of all layers, in one a layer.
+    fn maps_folder(&self, root: &Path, report: &PairReport) -> PathBuf {
+        let mut folder = root.to_owned();
+        if self.reference.is_dir() {
+            folder.extend(report.path.split('/'));
+        }
+        match &report.layer {
+            Some(layer) if self.all_layers => folder.join(file_name(layer)),
+            _ => folder,
+        }
+    }
+}
+
+/// A layer's name as the name of a folder: what is no letter, digit, `-` or `_` becomes
+/// `%` and its code, so that no name leads elsewhere and no two become one.
+fn file_name(layer: &str) -> String {
+    let mut name = String::new();
+    for (i, byte) in layer.bytes().enumerate() {
+        if byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'_') || byte == b'.' && i > 0 {
+            name.push(char::from(byte));
+        } else {
+            name += &format!("%{byte:02X}");
+        }
+    }
+    name
+}
+
+/// Compares two images or two folders.
+pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
+    let settings = args.settings()?;
+    let folders = args.reference.is_dir();
+    if args.diff.is_some() && (folders || args.all_layers) {
+        return Err(Failure::usage(
+            "--diff draws one picture of two images: --maps leaves a side-by-side.png for each of many",
+        ));
+    }
+    let mut drawn = |report: &PairReport, drawn: &Drawn<'_>| {
+        if let Some(root) = &args.maps {
+            write_maps(&args.maps_folder(root, report), drawn, args.scale)?;
+        }
+        if let Some(file) = &args.diff {
+            write_png(file, &side_by_side(drawn)?)?;
+        }
+        Ok(())
+    };
+    let found = if folders {
+        let bar = bar();
+        compare(&args.reference, &args.test, &settings, &|done, of, what| bar.step(done, of, what), &mut drawn)
+    } else {
+        compare(&args.reference, &args.test, &settings, &|_, _, _| {}, &mut drawn)
+    }?;
+    match args.format {
+        Format::Text => print(&table::table(&found, folders || args.all_layers))?,
+        Format::Json => print(&json(&found)?)?,
+    }
+    table::warnings(&found).iter().for_each(|w| tell(w));
+    Ok(match found.outcome {
+        Outcome::Error => Exit::Usage,
+        Outcome::Nothing => Exit::Nothing,
+        Outcome::Fail => Exit::Failed,
+        Outcome::Inconclusive => Exit::Inconclusive,
+        Outcome::Warn | Outcome::Pass | Outcome::Measured => Exit::Pass,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn layers_become_names_of_folders() {
+        for (layer, name) in [
+            ("color.RGB", "color.RGB"),
+            ("../../x", "%2E.%2F..%2Fx"),
+            ("a/b", "a%2Fb"),
+            ("..", "%2E."),
+            ("ä", "%C3%A4"),
+        ] {
+            assert_eq!(file_name(layer), name);
+        }
+    }
+
+    #[test]
+    fn a_tolerance_may_be_a_fraction() {
+        assert_eq!(tolerance("2/255"), Ok(2.0 / 255.0));
+        assert_eq!(tolerance("0.5"), Ok(0.5));
+        for text in ["", "x", "-1", "2", "1/0", "0/0", "nan"] {
+            assert!(tolerance(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,254 @@
+//! Images against references: pairs of files and of folders, by every full-reference
+//! metric or pixel by pixel, with limits that make a verdict.
+//!
+//! Any renderer's images will do: nothing here knows of scenes or suites.
+
+mod exact;
+mod folders;
+mod limits;
+mod pair;
+mod pictures;
+mod region;
+mod report;
+mod sampled;
+
+pub use exact::{Exact, exact, exact_images};
+pub use folders::Pairing;
+pub use limits::{Limit, Limits, MapName, Measure, Sense, Statistic, Tier};
+pub use pictures::{Drawn, side_by_side, write_maps};
+pub use region::{Rect, Region, Weights};
+pub use report::{Comparison, LimitReport, LimitState, Mode, Outcome, PairReport, VERSION};
+pub use sampled::WelchReport;
+
+use crate::{
+    disk::DiskError,
+    metrics::image::{Encoding, ImageError, Options},
+    picture::error_map::MapError,
+};
+use std::path::{Path, PathBuf};
+
+/// The chance that Welch's test rejects anything, over all places and scales, where
+/// both images have one expectation.
+pub const ALPHA: f64 = 0.01;
+
+/// Why images cannot be compared.
+#[derive(Debug, thiserror::Error)]
+pub enum CompareError {
+    /// A file cannot be read or written.
+    #[error(transparent)]
+    Disk(#[from] DiskError),
+    /// The images do not fit each other.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// A map cannot be drawn.
+    #[error(transparent)]
+    Map(#[from] MapError),
+    /// Two files do not go together.
+    #[error("{} and {}: {source}", reference.display(), test.display())]
+    Between {
+        /// The reference.
+        reference: PathBuf,
+        /// The test image.
+        test: PathBuf,
+        /// Why.
+        source: Box<CompareError>,
+    },
+    /// A rectangle is not within the image.
+    #[error("{option} {rect} reaches beyond the image of {} x {} pixels", size[0], size[1])]
+    Outside {
+        /// The option it came by.
+        option: &'static str,
+        /// The rectangle.
+        rect: Rect,
+        /// Width and height of the image.
+        size: [usize; 2],
+    },
+    /// Integers against floats.
+    #[error("one image holds integers and the other floats: the pixel-exact metric compares stored numbers")]
+    Kinds,
+    /// Data windows of OpenEXR begin at different places.
+    #[error("the data windows begin at different pixels: the reference's at {}, {}, the test image's at {}, {}", reference[0], reference[1], test[0], test[1])]
+    Origins {
+        /// Of the reference.
+        reference: [i32; 2],
+        /// Of the test image.
+        test: [i32; 2],
+    },
+    /// A layer is in one file only.
+    #[error("the layer is in {} alone", path.display())]
+    Layer {
+        /// The file that has it.
+        path: PathBuf,
+    },
+    /// A folder is a record.
+    #[error("{} is a record (it has a record.json): compare takes images and folders of images, and compares no records", folder.display())]
+    Record {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// Folders in folders without end.
+    #[error("{}: folders lie more than {most} deep", folder.display())]
+    Deep {
+        /// The folder.
+        folder: PathBuf,
+        /// How deep they may lie.
+        most: usize,
+    },
+    /// A file and a folder.
+    #[error("{} is a folder and {} is none: both must be images, or both folders of images", folder.display(), file.display())]
+    FolderAndFile {
+        /// The folder.
+        folder: PathBuf,
+        /// The other.
+        file: PathBuf,
+    },
+    /// A limits file is malformed. The message names the line.
+    #[error("{file}: {source}")]
+    Limits {
+        /// The file.
+        file: String,
+        /// What and where.
+        source: Box<toml::de::Error>,
+    },
+    /// A limit on what is not computed.
+    #[error("the limit {limit}: --exact computes differing and largest-difference alone")]
+    NotExact {
+        /// The limit.
+        limit: Limit,
+    },
+    /// A number is out of its range.
+    #[error("the tolerance is {0}, it must be 0 to 1")]
+    Tolerance(f64),
+}
+
+/// Which layers of OpenEXR images are compared.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Layer {
+    /// R, G and B, else Y, else `mean`, else the only channel.
+    #[default]
+    Main,
+    /// One by name.
+    Named(String),
+    /// All of them, each for itself.
+    All,
+}
+
+/// An image of weights, black 0 and white 1.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mask {
+    /// The file; or a folder, whose images weigh those of the same relative path.
+    pub path: PathBuf,
+    /// The layer of an OpenEXR file.
+    pub layer: Option<String>,
+}
+
+impl Mask {
+    /// Reads `FILE`, `FOLDER` or `FILE:LAYER`; what exists as it is written has no
+    /// layer.
+    pub fn parse(text: &str) -> Self {
+        let whole = Mask { path: text.into(), layer: None };
+        match text.rsplit_once(':') {
+            Some((file, layer)) if !whole.path.exists() && Path::new(file).exists() => {
+                Mask { path: file.into(), layer: Some(layer.to_owned()) }
+            }
+            _ => whole,
+        }
+    }
+}
+
+/// How images are compared.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Settings {
+    /// By what.
+    pub mode: Mode,
+    /// What the metrics are computed with.
+    pub options: Options,
+    /// Layers of OpenEXR images.
+    pub layer: Layer,
+    /// What the numbers stand for; by the kind of file unless given.
+    pub encoding: Option<Encoding>,
+    /// Weights of pixels.
+    pub mask: Option<Mask>,
+    /// Rectangles.
+    pub region: Region,
+    /// A pixel differs where a channel does by more than this, of a range of 0 to 1.
+    pub tolerance: f64,
+    /// What must hold.
+    pub limits: Limits,
+    /// Images of the reference may be missing.
+    pub allow_missing: bool,
+}
+
+impl Settings {
+    fn check(&self) -> Result<(), CompareError> {
+        if !(0.0..=1.0).contains(&self.tolerance) {
+            return Err(CompareError::Tolerance(self.tolerance));
+        }
+        match self.limits.all().find(|l| self.mode == Mode::Exact && !l.measure.is_exact()) {
+            Some(limit) => Err(CompareError::NotExact { limit }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Compares two images, or two folders of images by relative path.
+///
+/// `step` is told how many pairs are done, of how many, and the next one's path.
+/// `drawn` is given every pair that has maps while its images are in memory.
+///
+/// # Errors
+/// Of two files, whatever keeps them from being compared. Of two folders that becomes
+/// an error of the pair, and errors are what concerns all pairs: settings, the folders
+/// themselves, and what `drawn` returns.
+pub fn compare(
+    reference: &Path,
+    test: &Path,
+    settings: &Settings,
+    step: &dyn Fn(usize, usize, &str),
+    drawn: &mut dyn FnMut(&PairReport, &Drawn<'_>) -> Result<(), CompareError>,
+) -> Result<Comparison, CompareError> {
+    settings.check()?;
+    let mut settings = settings.clone();
+    settings.options.hdr |= settings.limits.all().any(|l| l.measure.needs_hdr());
+    let mut comparison = Comparison::new(reference, test, &settings);
+    match (reference.is_dir(), test.is_dir()) {
+        (true, true) => {}
+        (false, false) => {
+            let name = reference.display().to_string();
+            comparison.pairs = pair::Files { reference, test, name: &name, mask: None }.compare(&settings, drawn)?;
+            comparison.conclude(settings.allow_missing);
+            return Ok(comparison);
+        }
+        (true, false) => return Err(CompareError::FolderAndFile { folder: reference.into(), file: test.into() }),
+        (false, true) => return Err(CompareError::FolderAndFile { folder: test.into(), file: reference.into() }),
+    }
+    let pairing = Pairing::of(reference, test)?;
+    for (i, name) in pairing.both.iter().enumerate() {
+        step(i, pairing.both.len(), name);
+        let (reference, test) = (&reference.join(name), &test.join(name));
+        let mut failed = None;
+        let mut keep = |report: &PairReport, maps: &Drawn<'_>| {
+            drawn(report, maps).map_err(|e| {
+                // What cannot be written concerns all pairs, not this one.
+                let message = e.to_string();
+                failed = Some(e);
+                DiskError::content(Path::new(name), message).into()
+            })
+        };
+        let found = pair::Files { reference, test, name, mask: Some(name) }.compare(&settings, &mut keep);
+        if let Some(e) = failed {
+            return Err(e);
+        }
+        let reports = found.unwrap_or_else(|e| vec![PairReport::failed(name, None, &e)]);
+        comparison.pairs.extend(reports);
+    }
+    (comparison.missing, comparison.new) = (pairing.missing, pairing.new);
+    comparison.left_out = pairing.left_out;
+    comparison.conclude(settings.allow_missing);
+    Ok(comparison)
+}
+
+/// The pixels of two images are the same places only where both begin at one.
+fn check_origins(reference: [i32; 2], test: [i32; 2]) -> Result<(), CompareError> {
+    if reference == test { Ok(()) } else { Err(CompareError::Origins { reference, test }) }
+}

@@ -1,0 +1,235 @@
+//! Two files: read, cut, measured and judged.
+
+use super::{
+    CompareError, Drawn, Exact, Layer, Mask, Mode, PairReport, Settings, Weights, check_origins, exact, exact_images,
+    sampled::{Sampled, WelchReport},
+};
+use crate::{
+    layers::Layers,
+    metrics::image::{Encoding, Image, ImageError, Pair, scores},
+    picture::read::{self, Found, LayerChoice},
+    stats::pixel_p_values,
+};
+use std::{collections::BTreeMap, path::Path};
+
+/// Two files and what they are called.
+pub(super) struct Files<'a> {
+    pub(super) reference: &'a Path,
+    pub(super) test: &'a Path,
+    /// What reports call the pair, and limits match.
+    pub(super) name: &'a str,
+    /// The path of its mask within a folder of masks.
+    pub(super) mask: Option<&'a str>,
+}
+
+/// Is given every pair that has maps.
+type Keep<'a> = dyn FnMut(&PairReport, &Drawn<'_>) -> Result<(), CompareError> + 'a;
+
+impl Files<'_> {
+    /// One report, or one a layer.
+    pub(super) fn compare(&self, settings: &Settings, keep: &mut Keep<'_>) -> Result<Vec<PairReport>, CompareError> {
+        let (reference, test) = rayon::join(|| read::load(self.reference), || read::load(self.test));
+        let (reference, test) = (reference?, test?);
+        let mask = self.mask(settings.mask.as_ref())?;
+        if settings.mode == Mode::Exact {
+            let found = self.exact(&reference, &test, settings, mask.as_ref());
+            if let Some(exact) = found.map_err(|e| self.between(e))? {
+                return Ok(vec![PairReport::judged(self.name, None, exact, None, None, &settings.limits)]);
+            }
+        }
+        let (ours, theirs) = rayon::join(
+            || read::decode(self.reference, &reference, choice(&settings.layer), settings.encoding),
+            || read::decode(self.test, &test, choice(&settings.layer), settings.encoding),
+        );
+        let (ours, theirs) = (ours?, theirs?);
+        let sampled = self.sampled(&reference, &test, settings)?;
+        drop((reference, test));
+        self.layers(ours, theirs, settings.layer == Layer::All)
+            .into_iter()
+            .map(|(layer, pair)| {
+                let report =
+                    pair.and_then(|(r, t)| self.layer(&layer, &r, &t, settings, mask.as_ref(), sampled.as_ref(), keep));
+                match report {
+                    // One layer that cannot be compared leaves the others.
+                    Err(e) if settings.layer == Layer::All && !matches!(e, CompareError::Disk(_)) => {
+                        Ok(PairReport::failed(self.name, Some(layer), &e))
+                    }
+                    Err(e) => Err(self.between(e)),
+                    Ok(report) => Ok(report),
+                }
+            })
+            .collect()
+    }
+
+    /// Names both files, where an error does not name its own.
+    fn between(&self, e: CompareError) -> CompareError {
+        match e {
+            e @ CompareError::Disk(_) => e,
+            e => {
+                CompareError::Between { reference: self.reference.into(), test: self.test.into(), source: Box::new(e) }
+            }
+        }
+    }
+
+    /// Both images layer by layer, by name where all are compared.
+    fn layers(
+        &self,
+        ours: Vec<Found>,
+        theirs: Vec<Found>,
+        all: bool,
+    ) -> Vec<(String, Result<(Found, Found), CompareError>)> {
+        if !all {
+            return ours.into_iter().zip(theirs).map(|(r, t)| (r.layer.clone(), Ok((r, t)))).collect();
+        }
+        let mut theirs: BTreeMap<String, Found> = theirs.into_iter().map(|t| (t.layer.clone(), t)).collect();
+        let alone = |path: &Path| Err(CompareError::Layer { path: path.into() });
+        let mut pairs: Vec<_> = ours
+            .into_iter()
+            .map(|r| {
+                let name = r.layer.clone();
+                let pair = theirs.remove(&name).map_or_else(|| alone(self.reference), |t| Ok((r, t)));
+                (name, pair)
+            })
+            .collect();
+        pairs.extend(theirs.into_keys().map(|name| (name, alone(self.test))));
+        pairs
+    }
+
+    /// The pixel-exact metric on stored numbers; None where layers must be told apart
+    /// first, which [`Files::layer`] does.
+    fn exact(
+        &self,
+        reference: &[u8],
+        test: &[u8],
+        settings: &Settings,
+        mask: Option<&Weights>,
+    ) -> Result<Option<Exact>, CompareError> {
+        let region = &settings.region;
+        if reference == test {
+            // A header that can be read; what follows it is the same in both.
+            let size = read::size(self.reference, reference)?;
+            let weights = region.weights(size, mask)?;
+            return Ok(Some(Exact::of_identical_files(size, region, weights.as_deref())));
+        }
+        if read::is_exr(self.reference, reference) || read::is_exr(self.test, test) {
+            return Ok(None);
+        }
+        if matches!(settings.layer, Layer::Named(_)) {
+            return Err(crate::disk::DiskError::content(self.reference, "only OpenEXR images have layers").into());
+        }
+        let (ours, theirs) =
+            rayon::join(|| read::decode_samples(self.reference, reference), || read::decode_samples(self.test, test));
+        let (ours, theirs) = (ours?, theirs?);
+        if ours.size != theirs.size {
+            return Err(ImageError::Size { reference: ours.size, test: theirs.size }.into());
+        }
+        let weights = region.weights(ours.size, mask)?;
+        exact(&ours, &theirs, region, weights.as_deref(), settings.tolerance).map(Some)
+    }
+
+    /// One layer of both.
+    #[allow(clippy::too_many_arguments)] // what a layer is, and what all layers share
+    fn layer(
+        &self,
+        layer: &str,
+        reference: &Found,
+        test: &Found,
+        settings: &Settings,
+        mask: Option<&Weights>,
+        sampled: Option<&[Sampled; 2]>,
+        keep: &mut Keep<'_>,
+    ) -> Result<PairReport, CompareError> {
+        let whole = reference.image.size();
+        if whole != test.image.size() {
+            return Err(ImageError::Size { reference: whole, test: test.image.size() }.into());
+        }
+        let encodings = [reference.image.encoding(), test.image.encoding()];
+        if encodings[0] != encodings[1] {
+            return Err(ImageError::Encoding { reference: encodings[0], test: encodings[1] }.into());
+        }
+        check_origins(reference.origin, test.origin)?;
+        let region = &settings.region;
+        let weights = region.weights(whole, mask)?;
+        let weights = weights.as_deref().map(|w| region.cut(whole, w));
+        let cut = |image: &Image| {
+            let planes = image.planes().iter().map(|p| region.cut(whole, p).into_owned()).collect();
+            Image::new(region.size(whole), planes, image.encoding())
+        };
+        let cut_out = if region.crop.is_some() { Some((cut(&reference.image)?, cut(&test.image)?)) } else { None };
+        let (reference, test) = cut_out.as_ref().map_or((&reference.image, &test.image), |(r, t)| (r, t));
+        let corner = region.crop.map_or([0, 0], |c| [c.x, c.y]);
+        let exact = exact_images(reference, test, corner, weights.as_deref(), settings.tolerance)?;
+        let layer = Some(layer.to_owned()).filter(|l| !l.is_empty());
+        if settings.mode == Mode::Exact {
+            return Ok(PairReport::judged(self.name, layer, exact, None, None, &settings.limits));
+        }
+        let pair = Pair::new(reference, test, weights.as_deref())?;
+        let (scores, maps) = scores(&pair, &settings.options)?;
+        let size = scores.size.map(|n| n as u32);
+        let welch = sampled.map(|sampled| WelchReport::of(size, sampled));
+        let p = sampled.map(|[reference, test]| pixel_p_values(size, &test.sample(), &reference.sample()));
+        let report = PairReport::judged(self.name, layer, exact, Some(scores), welch, &settings.limits);
+        keep(&report, &Drawn { reference, test, maps: &maps, p: p.as_deref() })?;
+        Ok(report)
+    }
+
+    /// The mask's weights: linear, the mean of its channels.
+    fn mask(&self, mask: Option<&Mask>) -> Result<Option<Weights>, CompareError> {
+        let Some(mask) = mask else {
+            return Ok(None);
+        };
+        let within = self.mask.filter(|_| mask.path.is_dir()).map(|name| mask.path.join(name));
+        let path = match &within {
+            Some(path) if !path.exists() => return Ok(None),
+            Some(path) => path,
+            None => &mask.path,
+        };
+        let image = read::read(path, mask.layer.as_deref(), Some(Encoding::Linear))?.image;
+        let planes = image.planes();
+        let weight = |i: usize| planes.iter().map(|p| p[i]).sum::<f32>() / planes.len() as f32;
+        let weights: Vec<f32> = (0..image.pixels()).map(weight).collect();
+        match weights.iter().position(|w| !(0.0..=1.0).contains(w)) {
+            Some(pixel) => Err(ImageError::Weight { pixel, weight: weights[pixel] }.into()),
+            None => Ok(Some(Weights { size: image.size(), weights })),
+        }
+    }
+
+    /// The replicates of two images of records, where both have two or more and the
+    /// whole image is compared.
+    fn sampled(
+        &self,
+        reference: &[u8],
+        test: &[u8],
+        settings: &Settings,
+    ) -> Result<Option<[Sampled; 2]>, CompareError> {
+        let is_mean = match &settings.layer {
+            Layer::Main => true,
+            Layer::Named(name) => name == "mean",
+            Layer::All => false,
+        };
+        if !is_mean || settings.mode == Mode::Exact || !settings.region.is_whole() || settings.mask.is_some() {
+            return Ok(None);
+        }
+        let replicates = |path: &Path, bytes: &[u8]| -> Result<Option<Sampled>, CompareError> {
+            let is_replicate = |name: &String| name.starts_with("replicate-");
+            if read::layer_names(path, bytes)?.iter().filter(|n| is_replicate(n)).count() < 2 {
+                return Ok(None);
+            }
+            let Layers { layers, attributes, .. } = Layers::read(path)?;
+            let images = layers.into_iter().filter(|(name, _)| is_replicate(name)).map(|(_, values)| values).collect();
+            Ok(Some(Sampled::new(images, attributes.get("rays").and_then(|r| r.parse().ok()))))
+        };
+        let Some(reference) = replicates(self.reference, reference)? else {
+            return Ok(None);
+        };
+        Ok(replicates(self.test, test)?.map(|test| [reference, test]))
+    }
+}
+
+fn choice(layer: &Layer) -> LayerChoice<'_> {
+    match layer {
+        Layer::Main => LayerChoice::Main,
+        Layer::Named(name) => LayerChoice::Named(name),
+        Layer::All => LayerChoice::All,
+    }
+}
