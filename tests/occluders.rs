@@ -157,6 +157,34 @@ fn scenes_of_one_occluder_in_view_say_nothing_twice() {
     }
 }
 
+/// A view between two curtains of the atrium, with a column beside the hem of each, on
+/// flags with bevels: each has regions, and its footprint lies under its cloth.
+#[test]
+fn beside_the_columns_of_the_atrium_a_curtain_has_its_footprint_under_it() {
+    let mut scene = library::scene("atrium").unwrap();
+    scene.measure.center.x = 2.1;
+    scene.measure.resolution = [208, 256];
+    let geometry = Geometry::new(&scene).unwrap();
+    let gbuffer = GBuffer::new(&geometry.tracer, &scene.measure.view());
+    let finder = Finder::new(&scene, &geometry.tracer);
+    let found = finder.by_occluder(&gbuffer, &finder.regions(&gbuffer));
+    let names: Vec<&str> = found.iter().map(|o| o.name.as_str()).collect();
+    assert!(names.len() == 2 && names[0].ends_with("red-4") && names[1].ends_with("green-5"), "{names:?}");
+    // The margin, and what the slope of a bevel adds.
+    let margin = 0.02 * scene.ao.radius + 0.01;
+    for own in &found {
+        let cloth = &scene.objects.iter().find(|o| o.name == own.name).unwrap().mesh.positions;
+        let low = cloth.iter().copied().reduce(|a, b| a.min(b)).unwrap() - margin;
+        let high = cloth.iter().copied().reduce(|a, b| a.max(b)).unwrap() + margin;
+        let footprint = own.regions.pixels(Region::Footprint);
+        assert!(footprint.len() > 100, "{}: {}", own.name, footprint.len());
+        for &i in footprint {
+            let p = gbuffer.surfaces[i as usize].unwrap().point;
+            assert!(p.x > low.x && p.x < high.x && p.z > low.z && p.z < high.z, "{}: {p}", own.name);
+        }
+    }
+}
+
 /// A second curtain 0.3 m beside that of the library: the regions of each are what the
 /// scene's would be with that curtain as the only occluder.
 #[test]
