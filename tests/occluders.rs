@@ -14,6 +14,7 @@ use aogauge::{
     scenes::{Scene, library},
     suite::{Plan, Platform, Suite},
 };
+use glam::Vec3;
 use std::fs;
 
 struct Silent;
@@ -154,6 +155,35 @@ fn scenes_of_one_occluder_in_view_say_nothing_twice() {
         let regions = finder.regions(&gbuffer);
         let found = finder.by_occluder(&gbuffer, &regions);
         assert!(found.is_empty(), "{name}: {:?}", found.iter().map(|o| &o.name).collect::<Vec<_>>());
+    }
+}
+
+/// A view between two curtains of the atrium, one of them drawn aside, with a column
+/// beside the hem, on flags with bevels: each has regions, its footprint under its hem.
+#[test]
+fn beside_the_columns_of_the_atrium_a_curtain_has_its_footprint_under_it() {
+    let mut scene = library::scene("atrium").unwrap();
+    scene.measure.center.x = 2.4;
+    scene.measure.resolution = [208, 256];
+    let geometry = Geometry::new(&scene).unwrap();
+    let gbuffer = GBuffer::new(&geometry.tracer, &scene.measure.view());
+    let finder = Finder::new(&scene, &geometry.tracer);
+    let found = finder.by_occluder(&gbuffer, &finder.regions(&gbuffer));
+    let names: Vec<&str> = found.iter().map(|o| o.name.as_str()).collect();
+    assert!(names.len() == 2 && names[0].ends_with("red-4") && names[1].ends_with("green-5"), "{names:?}");
+    // The margin, and what the slope of a bevel adds.
+    let margin = 0.02 * scene.ao.radius + 0.01;
+    for own in &found {
+        let cloth = scene.objects.iter().find(|o| o.name == own.name).unwrap().mesh.positions.iter();
+        let hem: Vec<Vec3> = cloth.copied().filter(|v| v.y < 0.1).collect();
+        let low = hem.iter().copied().reduce(Vec3::min).unwrap() - margin;
+        let high = hem.iter().copied().reduce(Vec3::max).unwrap() + margin;
+        let footprint = own.regions.pixels(Region::Footprint);
+        assert!(footprint.len() > 20, "{}: {}", own.name, footprint.len());
+        for &i in footprint {
+            let p = gbuffer.surfaces[i as usize].unwrap().point;
+            assert!(p.x > low.x && p.x < high.x && p.z > low.z && p.z < high.z, "{}: {p}", own.name);
+        }
     }
 }
 

@@ -82,14 +82,23 @@ fn under(objects: &[Object], group: &[&Stand], normal: Vec3, radius: f32) -> Res
     let of = |sheet: usize| low.iter().filter(|s| s.sheet == sheet).count();
     let sheet = low.iter().map(|s| s.sheet).max_by_key(|&sheet| (of(sheet), std::cmp::Reverse(sheet)));
     let edge: Vec<Vec3> = low.iter().filter(|s| Some(s.sheet) == sheet).map(|s| s.base).collect();
-    let mean = edge.iter().sum::<Vec3>() / edge.len() as f32;
-    let center = edge.iter().copied().min_by(|a, b| a.distance(mean).total_cmp(&b.distance(mean))).unwrap_or(mean);
+    // And of that, where one object is many curtains, a place under one: between
+    // them all, or along their row, a view would measure none.
+    let (_, place) = middle(&edge);
+    let edge: Vec<Vec3> = edge.into_iter().filter(|p| p.distance(place) <= CLEAR * radius).collect();
+    let (mean, center) = middle(&edge);
     let transect = transect(&edge, mean, normal);
     let height = least_height(objects, center, normal, transect, radius);
     if height <= LEAST_GAP * radius {
         return Err((center, height));
     }
     Ok(MeasureView { center, normal, transect, clearance: 0.8 * height, pixel: radius / 50.0, resolution: [208, 32] })
+}
+
+/// The mean of some points, and the one of them that is nearest to it.
+fn middle(points: &[Vec3]) -> (Vec3, Vec3) {
+    let mean = points.iter().sum::<Vec3>() / points.len().max(1) as f32;
+    (mean, points.iter().copied().min_by(|a, b| a.distance(mean).total_cmp(&b.distance(mean))).unwrap_or(mean))
 }
 
 /// Why no part of the occluder stands over a receiver.

@@ -1,8 +1,11 @@
 //! Which receiver points lie under the occluder, beside it, and far away, from
 //! geometry alone.
 
+mod cut;
 mod finder;
+mod patches;
 
+pub use cut::cut_flank;
 pub use finder::{Finder, OccluderRegions};
 
 use super::Absent;
@@ -147,9 +150,21 @@ mod tests {
     }
 
     /// A round pillar of radius 0.3 m and 256 sides, and a radial sheet of no
-    /// thickness 5 cm off it: along the pillar, flanks are bands of arc length.
+    /// thickness 5 cm off it: along the pillar, flanks are bands of arc length; with
+    /// a wall along the sheet, nearer to it than the pillar, too.
     #[test]
     fn round_a_pillar_flanks_are_bands_of_arc_length() {
+        let wall = r#"
+[[object]]
+name = "wall"
+shape = { plane = { center = [0.02, 0.5, 0.65], u = [0, 1, 0], v = [0, 0, 0.6] } }
+"#;
+        for beside in ["", wall] {
+            are_bands_of_arc_length(beside);
+        }
+    }
+
+    fn are_bands_of_arc_length(beside: &str) {
         let (sides, radius) = (256, 0.3f32);
         let ring = |y: f32| {
             (0..sides).map(move |i| {
@@ -178,7 +193,7 @@ shape = {{ polygons = {{ positions = [{}], triangles = [{}] }} }}
 name = "sheet"
 occluder = true
 shape = {{ polygons = {{ positions = [[0, 0, 0.35], [0, 1, 0.35], [0, 1, 0.9], [0, 0, 0.9]], triangles = [[0, 1, 2], [0, 2, 3]] }} }}
-"#,
+{beside}"#,
             positions.join(", "),
             triangles.join(", ")
         );
@@ -292,6 +307,45 @@ occluder = true
 shape = { curtain = { thickness = 0, gap = 0.05, height = 1.0, length = 2.0, folds = "FOLDS", pleat_width = 0.1, pleat_depth = 0.06 } }
 "#;
         Scene::from_toml("x", "x.toml", &text.replace("FOLDS", folds), None).unwrap()
+    }
+
+    /// On a flat floor nothing that stands beside a hem counts: a plinth with a
+    /// sloping side, nearer to the hem than the floor is. Nor does it matter of how
+    /// many pieces the floor is made.
+    #[test]
+    fn on_a_floor_what_stands_beside_a_hem_changes_nothing() {
+        let alone = folded("wavy");
+        let regions = |scene: &Scene| {
+            let geometry = Geometry::new(scene).unwrap();
+            let gbuffer = GBuffer::new(&geometry.tracer, &scene.measure.view());
+            let regions = Regions::new(scene, &geometry.tracer, &gbuffer);
+            (gbuffer, regions)
+        };
+        let (_, expected) = regions(&alone);
+        let mut pieces = alone.clone();
+        let mut right = pieces.objects[0].clone();
+        right.name = "right".into();
+        pieces.objects[0].mesh.positions.iter_mut().for_each(|v| v.x = v.x.min(0.012));
+        right.mesh.positions.iter_mut().for_each(|v| v.x = v.x.max(0.012));
+        pieces.objects.push(right);
+        let mut plinth = alone.clone();
+        let mut slope = plinth.objects[0].clone();
+        slope.name = "plinth".into();
+        // From x = 0.05 on the floor to 0.08 at 0.1 m above it; 10 cm long.
+        slope.mesh.positions.iter_mut().for_each(|v| {
+            let top = v.x > 0.0;
+            *v = Vec3::new(if top { 0.08 } else { 0.05 }, if top { 0.1 } else { 0.0 }, v.z / 60.0);
+        });
+        plinth.objects.push(slope);
+        for scene in [pieces, plinth] {
+            let (gbuffer, found) = regions(&scene);
+            let floor = |i: &u32| gbuffer.surfaces[*i as usize].is_some_and(|s| s.normal.y > 0.999);
+            assert!((0..gbuffer.surfaces.len() as u32).filter(floor).count() > 9000);
+            for region in [Region::Footprint, Region::Left, Region::Right] {
+                let of = |r: &Regions| r.pixels(region).iter().copied().filter(floor).collect::<Vec<u32>>();
+                assert_eq!(of(&found), of(&expected), "{region:?} with {}", scene.objects[2].name);
+            }
+        }
     }
 
     fn follows_the_hem(folds: &str) {

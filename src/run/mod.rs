@@ -46,9 +46,9 @@ pub enum RunError {
         /// The object it sees.
         object: String,
     },
-    /// The measure view of a scene ends within a flank.
+    /// The measure view of a scene cuts off a flank of an occluder that it measures.
     #[error(
-        "scene '{scene}': the measure view ends within the {flank} flank; raise measure.resolution[0], {columns} now, so that it spans 2 R to each side where the receiver reaches that far"
+        "scene '{scene}': the measure view cuts off the {flank} flank of an occluder that it measures; raise measure.resolution[0], {columns} now, so that it spans 2 R to each side where the receiver reaches that far, or turn measure.transect across the occluder"
     )]
     CutsFlank {
         /// The scene.

@@ -10,7 +10,7 @@ use crate::{
         Absent, Metric, MetricName,
         artifact::Method,
         judge::{self, Judge, JudgedRegions, Pair, QImage},
-        regions::{Finder, Region, Regions},
+        regions::{OccluderRegions, Region, Regions},
     },
     record::{OccluderMetrics, OccluderRecord},
     render::gbuffer::GBuffer,
@@ -33,14 +33,13 @@ pub(super) struct JudgedOccluder {
 }
 
 impl Occluder {
-    /// All in view; none in a scene that shows fewer than two.
-    pub fn all(finder: &Finder<'_>, gbuffer: &GBuffer, regions: &Regions, screen: Option<&OnScreen>) -> Vec<Self> {
+    /// All that were found in view.
+    pub fn all(found: Vec<OccluderRegions>, gbuffer: &GBuffer, screen: Option<&OnScreen>) -> Vec<Self> {
         let mut visible = vec![false; gbuffer.surfaces.len()];
         for &i in screen.map_or(&[][..], |s| s.regions.pixels(Region::All)) {
             visible[i as usize] = true;
         }
-        finder
-            .by_occluder(gbuffer, regions)
+        found
             .into_iter()
             .map(|o| Occluder {
                 shown: screen.map(|_| o.regions.only(|i| visible[i as usize])),

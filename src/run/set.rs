@@ -15,7 +15,7 @@ use crate::{
         Absent,
         artifact::{Converged, Method as Measured},
         judge::JudgedRegions,
-        regions::{Finder, Region, Regions},
+        regions::{Finder, Region, Regions, cut_flank},
     },
     record::{CaseRecord, OccluderMetrics, RecordFolder, SceneRecord, Timing},
     render::{Frame, Geometry, Job, Loaded, RenderError, Renderer, gbuffer::GBuffer, path},
@@ -95,7 +95,9 @@ impl<'a> Set<'a> {
         if regions.pixels(Region::All).is_empty() {
             return Err(RunError::SeesNothing { scene: name() });
         }
-        if let Some(flank) = cut_flank(&regions, view.resolution[0]) {
+        let each = finder.by_occluder(&gbuffer, &regions);
+        drop(finder);
+        if let Some(flank) = cut_flank(&regions, &each, view.resolution[0]) {
             return Err(RunError::CutsFlank { scene: name(), flank: flank.label(), columns: view.resolution[0] });
         }
         let mut twin = None;
@@ -110,8 +112,7 @@ impl<'a> Set<'a> {
         }
         let hash = given.hash();
         let on_screen = OnScreen::new(plan, &scene, &geometry.tracer, &gbuffer, &regions)?;
-        let occluders = Occluder::all(&finder, &gbuffer, &regions, on_screen.as_ref());
-        drop(finder);
+        let occluders = Occluder::all(each, &gbuffer, on_screen.as_ref());
         Ok(Set { plan, scene, hash, geometry, twin, view, gbuffer, regions, occluders, on_screen })
     }
 
@@ -375,12 +376,6 @@ impl<'a> Set<'a> {
 
 pub(super) fn measured<'a>(replicates: &'a [Vec<f32>], converged: &'a Converged, regions: &'a Regions) -> Measured<'a> {
     Measured { replicates, converged, regions }
-}
-
-/// A flank that reaches the view's first or last column, and may go on beyond.
-fn cut_flank(regions: &Regions, width: u32) -> Option<Region> {
-    let outer = |i: &u32| [0, width - 1].contains(&(i % width));
-    [Region::Left, Region::Right].into_iter().find(|&flank| regions.pixels(flank).iter().any(outer))
 }
 
 pub(super) fn render_error(scene: &Scene) -> impl Fn(RenderError) -> RunError + use<> {

@@ -214,6 +214,12 @@ impl Tracer {
     /// The nearest point to `point`, within `radius`, on the triangles that
     /// `accept` takes (by their corners).
     pub fn nearest(&self, point: Vec3, radius: f32, accept: impl Fn(&[Vec3; 3]) -> bool) -> Option<Nearest> {
+        self.nearest_of(point, radius, |leaf| accept(&self.triangles[leaf as usize]))
+    }
+
+    /// The nearest point to `point`, within `radius`, on the triangles that
+    /// `accept` takes, by their numbers in [`Self::triangles`].
+    pub fn nearest_of(&self, point: Vec3, radius: f32, accept: impl Fn(u32) -> bool) -> Option<Nearest> {
         let mut best = radius * radius;
         let mut found = None;
         let mut stack: Vec<u32> = if self.nodes.is_empty() { vec![] } else { vec![0] };
@@ -230,7 +236,7 @@ impl Tracer {
                 let corners = &self.triangles[triangle as usize];
                 let at = closest_point(point, corners);
                 let d = (at - point).length_squared();
-                if d <= best && accept(corners) {
+                if d <= best && accept(triangle) {
                     best = d;
                     found = Some(Nearest { point: at, distance: d.sqrt(), triangle });
                 }

@@ -123,3 +123,16 @@ fn under_many_curtains_the_view_is_under_one_of_them() {
         assert!(found.clearance > 0.01 && found.clearance < 0.2, "{found:?}");
     }
 }
+
+/// One object of four curtains, 2 m apart in a row across them: the view is under
+/// one, across it.
+#[test]
+fn under_one_object_of_many_curtains_the_view_is_across_one_of_them() {
+    let at = [-3.0, -1.0, 1.0, 3.0];
+    let corners = at.map(|x| format!("[{x}, 0.05, -0.5], [{x}, 0.05, 0.5], [{x}, 1, 0.5], [{x}, 1, -0.5]")).join(", ");
+    let triangles = [0, 4, 8, 12].map(|i| format!("[{i}, {}, {}], [{i}, {}, {}]", i + 1, i + 2, i + 2, i + 3));
+    let shape = format!("polygons = {{ positions = [{corners}], triangles = [{}] }}", triangles.join(", "));
+    let found = found(0.25, &occluder(&shape)).unwrap();
+    assert!((found.transect - Vec3::X).length() < 1e-3, "{found:?}");
+    assert!(at.iter().any(|x| (x - found.center.x).abs() < 1e-3) && found.center.z.abs() < 0.26, "{found:?}");
+}

@@ -1,7 +1,7 @@
 //! Finding regions: the sheet's shadow on the receiver, and how far beside it a
 //! point lies.
 
-use super::{Region, Regions};
+use super::{Region, Regions, patches::smooth_patches};
 use crate::{
     render::gbuffer::{GBuffer, Surface},
     trace::Tracer,
@@ -36,6 +36,10 @@ pub struct Finder<'a> {
     sheet: Tracer,
     /// What is no occluder.
     receiver: Tracer,
+    /// The smooth patch of each triangle of `receiver`, in its own order.
+    patches: Vec<u32>,
+    /// That of each triangle of the scene; None for occluders.
+    patch: Vec<Option<u32>>,
     scene: &'a Scene,
     whole: &'a Tracer,
 }
@@ -43,12 +47,18 @@ pub struct Finder<'a> {
 impl<'a> Finder<'a> {
     /// Makes the trees of a scene; `whole` holds all its triangles.
     pub fn new(scene: &'a Scene, whole: &'a Tracer) -> Self {
-        let part = |occluder: bool| {
-            let triangles: Vec<[Vec3; 3]> =
-                scene.triangles().filter(|(o, _)| scene.objects[*o].occluder == occluder).map(|(_, t)| t).collect();
-            Tracer::new(&triangles)
+        let part = |occluder: bool| -> Vec<[Vec3; 3]> {
+            scene.triangles().filter(|(o, _)| scene.objects[*o].occluder == occluder).map(|(_, t)| t).collect()
         };
-        Finder { sheet: part(true), receiver: part(false), scene, whole }
+        let receiver = part(false);
+        // Without a sheet no one asks for patches.
+        let found = if scene.has_occluder() { smooth_patches(&receiver) } else { Vec::new() };
+        let receiver = Tracer::new(&receiver);
+        let mut in_order = found.iter().copied();
+        let patch =
+            scene.triangles().map(|(o, _)| if scene.objects[o].occluder { None } else { in_order.next() }).collect();
+        let patches = receiver.source().iter().filter_map(|&i| found.get(i as usize).copied()).collect();
+        Finder { sheet: Tracer::new(&part(true)), receiver, patches, patch, scene, whole }
     }
 
     /// The regions of what a view sees, the sheet being all occluders together.
@@ -139,9 +149,12 @@ impl<'a> Finder<'a> {
     }
 
     fn is_far(&self, s: &Surface) -> bool {
-        let off_plane = |v: &Vec3| s.normal.dot(*v - s.point).abs() > OWN_PLANE * self.radius();
-        let foreign = |t: &[Vec3; 3]| t.iter().any(off_plane);
-        self.whole.nearest(s.point, self.radius(), foreign).is_none()
+        self.whole.nearest(s.point, self.radius(), |t| !self.is_in_plane(s, t)).is_none()
+    }
+
+    /// Whether a triangle lies in the tangent plane of `s`.
+    fn is_in_plane(&self, s: &Surface, triangle: &[Vec3; 3]) -> bool {
+        triangle.iter().all(|v| s.normal.dot(*v - s.point).abs() <= OWN_PLANE * self.radius())
     }
 
     /// The vector, measured along the receiver, from `s` to the nearest point of
@@ -168,12 +181,22 @@ impl<'a> Finder<'a> {
         nearest
     }
 
-    /// The receiver under a point of the sheet; `s` itself where the receiver
-    /// there looks another way (round a corner arc length means nothing).
+    /// The receiver under a point of the sheet, as `s` sees it.
+    ///
+    /// Where the receiver in the tangent plane of `s` reaches under the point, it is
+    /// flat between the two, and that plane decides: `s` itself, whatever else stands
+    /// beside the sheet. Otherwise it is the point of the smooth patch of `s` that is
+    /// nearest to the sheet, to which an arc leads; and `s` itself again where the
+    /// patch is not near, or looks another way there (round a corner arc length
+    /// means nothing). Other surfaces never count: not the column beside a hem.
     fn base(&self, s: &Surface, sheet: Vec3) -> Surface {
-        let Some(at) = self.receiver.nearest(sheet, self.radius(), |_| true) else {
+        let foot = sheet - s.normal * s.normal.dot(sheet - s.point);
+        if self.receiver.nearest(foot, OWN_PLANE * self.radius(), |t| self.is_in_plane(s, t)).is_some() {
             return *s;
-        };
+        }
+        let Some(patch) = self.patch.get(s.triangle as usize).copied().flatten() else { return *s };
+        let own = |leaf: u32| self.patches.get(leaf as usize) == Some(&patch);
+        let Some(at) = self.receiver.nearest_of(sheet, self.radius(), own) else { return *s };
         let [a, b, c] = self.receiver.triangles()[at.triangle as usize];
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let normal = if normal.dot(sheet - at.point) < 0.0 { -normal } else { normal };
