@@ -80,17 +80,18 @@ fn rich_exr() -> Vec<u8> {
     use exr::prelude::*;
     let part = |name: &str, blocks: Blocks| {
         let values = FlatSamples::F16((0..48).map(|i| f16::from_f32(i as f32 / 48.0)).collect());
-        let channels = AnyChannels::sort(smallvec::smallvec![
-            AnyChannel::new("R", values.clone()),
-            AnyChannel::new("Z", FlatSamples::U32((0..48).collect())),
-        ]);
+        let channels = AnyChannels::sort(
+            [AnyChannel::new("R", values), AnyChannel::new("Z", FlatSamples::U32((0..48).collect()))]
+                .into_iter()
+                .collect(),
+        );
         let mut attributes = LayerAttributes::named(name);
         attributes.layer_position = Vec2(-3, 5);
         let encoding = Encoding { compression: Compression::RLE, blocks, line_order: LineOrder::Increasing };
         Layer::new((8, 6), attributes, encoding, channels)
     };
     let window = IntegerBounds::new((-3, 5), (8, 6));
-    let layers = smallvec::smallvec![part("scan", Blocks::ScanLines), part("tiles", Blocks::Tiles(Vec2(4, 4)))];
+    let layers = vec![part("scan", Blocks::ScanLines), part("tiles", Blocks::Tiles(Vec2(4, 4)))];
     let mut bytes = Cursor::new(Vec::new());
     Image::from_layers(ImageAttributes::new(window), layers).write().non_parallel().to_buffered(&mut bytes).unwrap();
     bytes.into_inner()

@@ -22,6 +22,9 @@ pub(super) struct Files<'a> {
     pub(super) mask: Option<&'a str>,
 }
 
+/// A layer of both images, or why there is none.
+type NamedLayer = (String, Result<(Found, Found), CompareError>);
+
 /// Is given every pair that has maps.
 type Keep<'a> = dyn FnMut(&PairReport, &Drawn<'_>) -> Result<(), CompareError> + 'a;
 
@@ -72,12 +75,7 @@ impl Files<'_> {
     }
 
     /// Both images layer by layer, by name where all are compared.
-    fn layers(
-        &self,
-        ours: Vec<Found>,
-        theirs: Vec<Found>,
-        all: bool,
-    ) -> Vec<(String, Result<(Found, Found), CompareError>)> {
+    fn layers(&self, ours: Vec<Found>, theirs: Vec<Found>, all: bool) -> Vec<NamedLayer> {
         if !all {
             return ours.into_iter().zip(theirs).map(|(r, t)| (r.layer.clone(), Ok((r, t)))).collect();
         }

@@ -187,7 +187,15 @@ pub fn size(path: &Path, bytes: &[u8]) -> Result<[usize; 2], DiskError> {
         return exr_size(path, bytes);
     }
     let (width, height) = reader(path, bytes)?.into_dimensions().map_err(|e| broken(path, &e))?;
-    Ok([width as usize, height as usize])
+    with_pixels(path, [width as usize, height as usize])
+}
+
+/// The size again, where there is any pixel.
+fn with_pixels(path: &Path, [width, height]: [usize; 2]) -> Result<[usize; 2], DiskError> {
+    if width == 0 || height == 0 {
+        return Err(broken(path, &format!("it has {width} x {height} pixels")));
+    }
+    Ok([width, height])
 }
 
 /// Whether the extension is one of an image that can be read.
@@ -234,7 +242,9 @@ fn reader<'a>(path: &Path, bytes: &'a [u8]) -> Result<ImageReader<Cursor<&'a [u8
 }
 
 fn decode_dynamic(path: &Path, bytes: &[u8]) -> Result<DynamicImage, DiskError> {
-    reader(path, bytes)?.decode().map_err(|e| broken(path, &e))
+    let decoded = reader(path, bytes)?.decode().map_err(|e| broken(path, &e))?;
+    with_pixels(path, [decoded.width() as usize, decoded.height() as usize])?;
+    Ok(decoded)
 }
 
 #[cfg(test)]

@@ -63,7 +63,7 @@ pub(super) fn decode(
         LayerChoice::Named(name) => vec![channels.named(path, name)?],
         LayerChoice::All => channels.layers(),
     };
-    wanted.into_iter().map(|names| channels.take(path, names, encoding)).collect()
+    wanted.into_iter().map(|names| channels.take(path, &names, encoding)).collect()
 }
 
 /// Refuses what the decoder would allocate too much for, and what it cannot read.
@@ -174,8 +174,8 @@ impl Channels {
         layers
     }
 
-    fn take(&mut self, path: &Path, names: Vec<String>, encoding: Encoding) -> Result<Found, DiskError> {
-        let layer = match &names[..] {
+    fn take(&mut self, path: &Path, names: &[String], encoding: Encoding) -> Result<Found, DiskError> {
+        let layer = match names {
             [one] => one.clone(),
             [red, ..] => red.strip_suffix('R').unwrap_or(red).to_owned() + "RGB",
             [] => String::new(),

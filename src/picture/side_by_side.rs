@@ -15,6 +15,8 @@ pub fn side_by_side(pictures: [(&str, &RgbImage); 2], title: &str, map: &ErrorMa
     let (size, margin, head) = map.layout();
     let column = width + margin;
     let mut whole = RgbImage::from_pixel(2 * column + right.width(), right.height(), Rgb([255; 3]));
+    // First, as its white margin reaches over the frame at its left.
+    image::imageops::replace(&mut whole, &right, i64::from(2 * column), 0);
     for (i, (name, picture)) in pictures.into_iter().enumerate() {
         let left = margin + i as u32 * column;
         let top = margin + head;
@@ -23,7 +25,6 @@ pub fn side_by_side(pictures: [(&str, &RgbImage); 2], title: &str, map: &ErrorMa
         fill(&mut whole, part, |x, y| *picture.get_pixel(x / factor, y / factor));
         frame(&mut whole, part);
     }
-    image::imageops::replace(&mut whole, &right, i64::from(2 * column), 0);
     whole
 }
 
