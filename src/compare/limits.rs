@@ -25,6 +25,7 @@ pub enum Measure {
 #[allow(missing_docs)] // they are called what they are
 pub enum MapName {
     Absolute,
+    Signed,
     Ssim,
     Flip,
     HdrFlip,
@@ -36,6 +37,8 @@ pub enum MapName {
 pub enum Statistic {
     Mean,
     Min,
+    P1,
+    P5,
     Median,
     P95,
     P99,
@@ -43,12 +46,13 @@ pub enum Statistic {
 }
 
 impl MapName {
-    const ALL: [MapName; 4] = [MapName::Absolute, MapName::Ssim, MapName::Flip, MapName::HdrFlip];
+    const ALL: [MapName; 5] = [MapName::Absolute, MapName::Signed, MapName::Ssim, MapName::Flip, MapName::HdrFlip];
 
     /// As it is written in options, and the key of its summary.
     pub fn label(self) -> &'static str {
         match self {
             MapName::Absolute => "absolute",
+            MapName::Signed => "signed",
             MapName::Ssim => "ssim",
             MapName::Flip => "flip",
             MapName::HdrFlip => "hdr-flip",
@@ -57,13 +61,23 @@ impl MapName {
 }
 
 impl Statistic {
-    const ALL: [Statistic; 6] =
-        [Statistic::Mean, Statistic::Min, Statistic::Median, Statistic::P95, Statistic::P99, Statistic::Max];
+    const ALL: [Statistic; 8] = [
+        Statistic::Mean,
+        Statistic::Min,
+        Statistic::P1,
+        Statistic::P5,
+        Statistic::Median,
+        Statistic::P95,
+        Statistic::P99,
+        Statistic::Max,
+    ];
 
     fn label(self) -> &'static str {
         match self {
             Statistic::Mean => "mean",
             Statistic::Min => "min",
+            Statistic::P1 => "p1",
+            Statistic::P5 => "p5",
             Statistic::Median => "median",
             Statistic::P95 => "p95",
             Statistic::P99 => "p99",
@@ -76,6 +90,8 @@ impl Statistic {
         match self {
             Statistic::Mean => summary.mean,
             Statistic::Min => summary.min,
+            Statistic::P1 => summary.p1,
+            Statistic::P5 => summary.p5,
             Statistic::Median => summary.median,
             Statistic::P95 => summary.p95,
             Statistic::P99 => summary.p99,
@@ -379,7 +395,7 @@ mod tests {
             ("flip", "is no limit"),
             ("flip<0.1", "is no limit"),
             ("flap<=0.1", "there is no 'flap'; there are: mean-error, mae"),
-            ("signed.max<=0.1", "there is no 'signed.max'"),
+            ("flip.p98<=0.1", "there is no 'flip.p98'"),
             ("flip<=x", "'x' in 'flip<=x' is no finite number"),
             ("flip<=nan", "is no finite number"),
             ("ssimulacra2>=90", "reported and has no limit"),

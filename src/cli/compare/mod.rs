@@ -24,8 +24,8 @@ aogauge compare a.png b.png --exact --fail 'differing<=0'\n  \
 aogauge compare a.exr b.exr --all-layers --ignore 0,0,320,40 --diff diff.png\n\n\
 OpenEXR, PNG, JPEG, Radiance HDR and TIFF. docs/compare.md tells how to use it in CI, docs/metrics.md what each\n\
 metric sees and misses. Limits are on mean-error, mae, mse, rmse, psnr, relative-mse, smape, ssim, ms-ssim, flip,\n\
-hdr-flip, differing, largest-difference, and on STATISTICS of maps: absolute, ssim, flip, hdr-flip, such as flip.p99\n\
-(mean, min, median, p95, p99, max).\n\
+hdr-flip, differing, largest-difference, and on MAP.STATISTIC, such as flip.p99: of the maps absolute, signed, ssim,\n\
+flip and hdr-flip the statistics mean, min, p1, p5, median, p95, p99 and max.\n\
 Exit codes: 0 pass or only warnings, 1 a limit is broken or an image is missing, 2 wrong usage or a pair that cannot\n\
 be compared, 4 no image to compare, 6 a metric under a limit has no value.")]
 pub struct Args {
