@@ -19,7 +19,7 @@ pub(super) const MAX_SIDE: u32 = 65_536;
 /// 16,384 pixels a side.
 const MAX_BYTES: u64 = 3 << 30;
 /// What any file may decode to, bytes, however small it is.
-const MIN_BYTES: u64 = 16 << 20;
+const MIN_BYTES: u64 = 4 << 20;
 /// More bytes of pixels than this for a byte of file is no honest compression:
 /// deflate ends at 1032.
 const MAX_RATIO: u64 = 2000;
