@@ -103,7 +103,8 @@ pub struct Verdict {
     /// The smallest detectable effect, in the metric's unit: how far on the right side
     /// of the limit the truth must lie to be decided with a probability of 0.8 (see
     /// [`Gate::verdict`]). A pass says little where that is larger than what matters.
-    /// Null where the metric is.
+    /// Null where the metric is, and where no replicate differs from another: a
+    /// standard error of 0 then says nothing of what could have been found.
     #[serde(default)]
     pub detectable: Option<f64>,
     /// p-value of the equivalence test, for `equals`.
@@ -139,12 +140,13 @@ impl Gate {
     /// the limit passes, one so far outside fails. Equivalence is tested on either
     /// side at 1 - `CONFIDENCE`, by t(0.95): a truth so far within the nearer edge of
     /// the margin passes, where the other edge is further away.
+    /// None where the standard error is 0 or unknown.
     fn detectable(&self, estimate: Estimate) -> Option<f64> {
         let alpha = match self.limit {
             Limit::AtLeast(_) | Limit::AtMost(_) => 1.0 - CONFIDENCE,
             Limit::Equals { .. } => 2.0 * (1.0 - CONFIDENCE),
         };
-        Some(estimate.detectable(alpha, POWER)).filter(|d| d.is_finite())
+        Some(estimate.detectable(alpha, POWER)).filter(|d| d.is_finite() && *d > 0.0)
     }
 
     /// Judges one metric.
@@ -233,6 +235,17 @@ mod tests {
         assert_eq!(outcome(equal, None, 1.0, 0.02), Inconclusive);
         assert_eq!(outcome(equal, None, 1.05, 0.001), Fail);
         assert_eq!(outcome(equal, None, 1.0, 0.0), Pass);
+    }
+
+    /// No replicate differs: nothing is known of what would have been found.
+    #[test]
+    fn without_scatter_nothing_is_detectable() {
+        let sees = |se| {
+            let metric = Metric::new(MetricName::Removed, None, Ok(Estimate { value: 0.6, se, df: 15.0 }));
+            gate(Limit::AtLeast(0.5), None).verdict("a", None, &metric).detectable
+        };
+        assert_eq!(sees(0.0), None);
+        assert!(sees(0.01).is_some_and(|d| d > 0.0));
     }
 
     #[test]

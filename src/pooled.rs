@@ -29,6 +29,9 @@ pub struct Pooled {
     pub renderer: String,
     /// Rays a pixel.
     pub rays: u32,
+    /// Mean K over the same scenes; null in records made before it was pooled.
+    #[serde(default)]
+    pub contrast: Pool,
     /// Mean dK over scenes. 0 is right on average; errors of two signs cancel.
     pub contrast_error: Pool,
     /// Mean |dK| over scenes, those included whose dK may be 0: leaving these out
@@ -52,7 +55,7 @@ pub struct Pooled {
 }
 
 /// A pooled value and where it comes from.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Pool {
     /// The value with its uncertainty.
@@ -115,6 +118,7 @@ impl Row<'_> {
             estimator: estimator.to_owned(),
             renderer: renderer.to_owned(),
             rays,
+            contrast: self.terms(false, |_, c| Ok((value(c, MetricName::Contrast, None)?, 1.0))).mean(),
             contrast_error_size: error.map(|e| Estimate { value: e.value.abs(), ..e }).mean(),
             contrast_error: error.mean(),
             removed: self.removed(),

@@ -22,11 +22,11 @@ use crate::stats::{Estimate, jackknife_of};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The RMSE that [`Convergence::rays_for`] is asked for in reports: a hundredth of
-/// the range of openness, two to three steps of an 8-bit picture.
+/// The RMSE whose rays are asked for unless a suite says otherwise: a hundredth of the
+/// range of openness, two to three steps of an 8-bit picture.
 pub const TARGET: f64 = 0.01;
 
-/// How far beyond the ray counts measured [`Convergence::rays_for`] goes.
+/// How far beyond the ray counts measured the power law is followed.
 const EXTRAPOLATE: f64 = 10.0;
 
 /// How one method converges on one renderer, over one region.
@@ -49,6 +49,21 @@ pub struct Convergence {
     pub limit: Quantity,
     /// v of that model: the variance of one ray.
     pub per_ray: Quantity,
+    /// What an RMSE takes; null in records made before this was kept.
+    #[serde(default)]
+    pub target: Option<Target>,
+}
+
+/// The rays that an RMSE takes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Target {
+    /// The RMSE.
+    pub rmse: f64,
+    /// Rays a pixel, by the power law through the points; fewer is better. Null where
+    /// there is no slope, the error does not fall, or the rays lie more than a factor
+    /// of 10 beyond those measured: nothing is known there.
+    pub rays: Quantity,
 }
 
 /// The error at one ray count.
@@ -114,6 +129,7 @@ pub fn convergence(
     mut levels: Vec<Level<'_>>,
     converged: &Converged,
     pixels: Result<&[u32], Absent>,
+    target: f64,
 ) -> Convergence {
     levels.sort_by_key(|l| l.rays);
     let found = pixels.and_then(|pixels| sample(&levels, converged, pixels));
@@ -133,17 +149,24 @@ pub fn convergence(
         bias_squared: of(&|m| m[i].bias_squared, 1),
         variance: of(&|m| m[i].variance, 1),
     });
+    let slope = match &found {
+        Ok(sample) if sample.whole.iter().any(|m| m.mse() <= 0.0) => {
+            Quantity::new(Err(Absent("the error is zero at a ray count, so it has no slope".into())))
+        }
+        _ => of(&|m| power_law(&rays, &mse(m))[1], 2),
+    };
+    let needed = match slope.value {
+        None => Quantity::new(Err(Absent("the slope of its error is not known".into()))),
+        Some(s) if s >= 0.0 => Quantity::new(Err(Absent("its error does not fall with its rays".into()))),
+        Some(_) => within_reach(&rays, of(&|m| rays_for(&rays, &mse(m), target), 2)),
+    };
     Convergence {
         estimator: estimator.to_owned(),
         renderer: renderer.to_owned(),
         region,
         points: points.collect(),
-        slope: match &found {
-            Ok(sample) if sample.whole.iter().any(|m| m.mse() <= 0.0) => {
-                Quantity::new(Err(Absent("the error is zero at a ray count, so it has no slope".into())))
-            }
-            _ => of(&|m| slope(&rays, &mse(m)), 2),
-        },
+        slope,
+        target: Some(Target { rmse: target, rays: needed }),
         limit: of(&|m| model(&rays, &mse(m))[0], 3),
         per_ray: of(&|m| model(&rays, &mse(m))[1], 3),
     }
@@ -225,11 +248,30 @@ impl<'a> Images<'a> {
     }
 }
 
-/// Slope of ln sqrt(mse) over ln rays, by least squares; not finite where an error
-/// is 0.
-fn slope(rays: &[f64], mse: &[f64]) -> f64 {
+/// Intercept and slope of ln sqrt(mse) over ln rays, by least squares; not finite
+/// where an error is 0.
+fn power_law(rays: &[f64], mse: &[f64]) -> [f64; 2] {
     let points: Vec<_> = rays.iter().zip(mse).map(|(n, e)| (n.ln(), e.ln() / 2.0, 1.0)).collect();
-    line(&points)[1]
+    line(&points)
+}
+
+/// The rays that an RMSE takes, by the power law.
+fn rays_for(rays: &[f64], mse: &[f64], rmse: f64) -> f64 {
+    let [intercept, slope] = power_law(rays, mse);
+    ((rmse.ln() - intercept) / slope).exp()
+}
+
+/// Rays that lie no further than [`EXTRAPOLATE`] from those measured, few first.
+fn within_reach(measured: &[f64], needed: Quantity) -> Quantity {
+    let (least, most) = (measured[0] / EXTRAPOLATE, measured[measured.len() - 1] * EXTRAPOLATE);
+    let beyond = |what: String| Quantity::new(Err(Absent(format!("{what} rays: beyond what was measured"))));
+    match needed.value {
+        Some(n) if n < least => beyond(format!("fewer than {least:.1}")),
+        Some(n) if n > most => beyond(format!("more than {most:.0}")),
+        // No finite number: so slow a fall that the power overflows.
+        None => beyond(format!("more than {most:.0}")),
+        Some(_) => needed,
+    }
 }
 
 /// b² and v of mse = b² + v/n, by least squares weighted by 1/mse², because the
@@ -239,7 +281,10 @@ fn model(rays: &[f64], mse: &[f64]) -> [f64; 2] {
     line(&points)
 }
 
-/// Intercept and slope of a line through points (x, y, weight).
+/// Intercept and slope of a line through points (x, y, weight). Not
+/// [`regress`](crate::stats::regress()): that takes its errors from the scatter about
+/// the line and so refuses two points, which are enough here, where errors are
+/// jackknifed.
 fn line(points: &[(f64, f64, f64)]) -> [f64; 2] {
     let sum = |f: fn(&(f64, f64, f64)) -> f64| points.iter().map(f).sum::<f64>();
     let weight = sum(|(_, _, w)| *w);
@@ -248,32 +293,6 @@ fn line(points: &[(f64, f64, f64)]) -> [f64; 2] {
     let along = points.iter().map(|(px, _, w)| w * (px - x).powi(2)).sum::<f64>();
     let slope = across / along;
     [y - slope * x, slope]
-}
-
-impl Convergence {
-    /// The rays that an RMSE takes, by the power law through the points.
-    ///
-    /// # Errors
-    /// Where there is no slope, the error does not fall, or the rays lie more than a
-    /// factor of 10 beyond those measured: nothing is known there.
-    pub fn rays_for(&self, rmse: f64) -> Result<f64, Absent> {
-        let unknown = || Absent("the slope of its error is not known".into());
-        let slope = self.slope.value.ok_or_else(unknown)?;
-        let errors: Option<Vec<f64>> = self.points.iter().map(|p| p.rmse.value).collect();
-        let errors = errors.ok_or_else(unknown)?;
-        let mean = |values: &[f64]| values.iter().map(|v| v.ln()).sum::<f64>() / values.len() as f64;
-        let rays: Vec<f64> = self.points.iter().map(|p| f64::from(p.rays)).collect();
-        if slope >= 0.0 {
-            return Err(Absent("its error does not fall with its rays".into()));
-        }
-        let needed = (mean(&rays) + (rmse.ln() - mean(&errors)) / slope).exp();
-        let (least, most) = (rays[0] / EXTRAPOLATE, rays[rays.len() - 1] * EXTRAPOLATE);
-        match needed {
-            n if n < least => Err(Absent(format!("fewer than {least:.1} rays: beyond what was measured"))),
-            n if n <= most => Ok(n),
-            _ => Err(Absent(format!("more than {most:.0} rays: beyond what was measured"))),
-        }
-    }
 }
 
 #[cfg(test)]
@@ -299,13 +318,23 @@ mod tests {
     }
 
     fn measure(salt: u32, bias: f64, rays: &[u32], deviation: impl Fn(f64) -> f64) -> Convergence {
+        measure_for(0.05, salt, bias, rays, deviation)
+    }
+
+    fn measure_for(
+        target: f64,
+        salt: u32,
+        bias: f64,
+        rays: &[u32],
+        deviation: impl Fn(f64) -> f64,
+    ) -> Convergence {
         let salt = salt * 16;
         let own: Vec<Vec<Vec<f32>>> =
             (1..).zip(rays).map(|(i, &n)| images(salt + i, 8, bias, deviation(f64::from(n)))).collect();
         let levels = rays.iter().zip(&own).map(|(&rays, r)| Level { rays, replicates: r }).collect();
         let converged = Converged::new(images(salt, 4, 0.0, 0.01));
         let pixels: Vec<u32> = (0..PIXELS).collect();
-        convergence(["e", "cpu"], Region::All, levels, &converged, Ok(&pixels))
+        convergence(["e", "cpu"], Region::All, levels, &converged, Ok(&pixels), target)
     }
 
     fn covered(q: &Quantity, truth: f64) -> usize {
@@ -344,10 +373,13 @@ mod tests {
             (0..400).map(|i| measure(i + 500, 0.0, &[4, 32], |n| 0.4 * n.powf(-0.75))).collect();
         let inside: usize = runs.iter().map(|c| covered(&c.slope, -0.75)).sum();
         assert!((366..=394).contains(&inside), "{inside} of 400");
-        let rays = runs[0].rays_for(0.05).unwrap();
-        assert!((rays / 16.0 - 1.0).abs() < 0.1, "{rays}");
-        assert!(runs[0].rays_for(1e-4).unwrap_err().0.contains("more than 320 rays"));
-        assert!(runs[0].rays_for(0.9).unwrap_err().0.contains("fewer than 0.4 rays"));
+        // 0.4 n^-0.75 is 0.05 at n = 16.
+        let inside: usize = runs.iter().map(|c| covered(&c.target.as_ref().unwrap().rays, 16.0)).sum();
+        assert!((366..=396).contains(&inside), "rays of a target: {inside} of 400");
+        for (rmse, says) in [(1e-4, "more than 320 rays"), (0.9, "fewer than 0.4 rays")] {
+            let beyond = measure_for(rmse, 500, 0.0, &[4, 32], |n| 0.4 * n.powf(-0.75)).target.unwrap();
+            assert!(beyond.rmse == rmse && beyond.rays.note.unwrap().contains(says));
+        }
         assert!(runs[0].limit.note.as_deref().unwrap().contains("3 ray counts"));
     }
 
@@ -356,16 +388,16 @@ mod tests {
         let one = measure(1, 0.0, &[4], |_| 0.1);
         assert!(one.points[0].rmse.value.is_some());
         assert!(one.slope.note.as_deref().unwrap().contains("2 ray counts"));
-        assert!(one.rays_for(TARGET).unwrap_err().0.contains("not known"));
+        assert!(one.target.unwrap().rays.note.unwrap().contains("not known"));
         // An error of exactly zero has no logarithm.
         let still = Converged::new(vec![vec![0.5; 64]; 4]);
         let images = vec![vec![0.5; 64]; 4];
         let levels = [4, 8].map(|rays| Level { rays, replicates: &images }).to_vec();
         let pixels: Vec<u32> = (0..64).collect();
-        let exact = convergence(["e", "cpu"], Region::All, levels.clone(), &still, Ok(&pixels));
+        let exact = convergence(["e", "cpu"], Region::All, levels.clone(), &still, Ok(&pixels), TARGET);
         assert_eq!((exact.points[1].rmse.value, exact.slope.value), (Some(0.0), None));
         assert!(exact.slope.note.as_deref().unwrap().contains("the error is zero"));
-        let none = convergence(["e", "cpu"], Region::All, levels, &still, Err(Absent("too small".into())));
+        let none = convergence(["e", "cpu"], Region::All, levels, &still, Err(Absent("too small".into())), TARGET);
         assert_eq!(none.points[0].rmse.note.as_deref(), Some("too small"));
     }
 }

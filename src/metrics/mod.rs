@@ -131,7 +131,7 @@ impl Metric {
 }
 
 /// A number with its uncertainty, of which the place in a record says what it is.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Quantity {
     /// The value; null where it is not defined.

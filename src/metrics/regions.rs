@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 /// Fewer pixels than this make a region's metrics null.
 pub const MIN_PIXELS: usize = 64;
 
-/// A part of the receiver (DESIGN, "The words").
+/// A part of the receiver (docs/metrics.md, regions).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Region {

@@ -24,7 +24,7 @@ pub enum Estimator {
     PathTraced,
 }
 
-/// The name a method goes by (DESIGN's and the paper's terms).
+/// The name a method goes by, each with what it computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {

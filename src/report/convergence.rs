@@ -3,10 +3,7 @@
 use super::table::plus_minus;
 use crate::{
     gate::CONFIDENCE,
-    metrics::{
-        Absent, Quantity,
-        convergence::{Convergence, TARGET},
-    },
+    metrics::{Quantity, convergence::Convergence},
     record::{Record, SceneRecord},
 };
 use serde::Serialize;
@@ -24,6 +21,8 @@ pub(super) struct ConvergenceRow {
     variance: String,
     slope: String,
     limit: String,
+    /// v of the model.
+    per_ray: String,
     /// 1 / (variance x time) at the most rays.
     efficiency: String,
     /// Rays and time to the target.
@@ -47,12 +46,7 @@ pub(super) fn rows(record: &Record, scene: &SceneRecord) -> (Vec<ConvergenceRow>
 fn row(record: &Record, scene: &SceneRecord, c: &Convergence) -> ConvergenceRow {
     let rmse = c.points.iter().map(|p| format!("{}: {}", p.rays, show(&p.rmse)));
     let last = c.points.last();
-    let variance = last.and_then(|p| p.variance.value);
     let seconds = last.and_then(|p| seconds(record, scene, c, p.rays));
-    let efficiency = match variance.zip(seconds) {
-        Some((v, s)) if v * s > 0.0 => format!("{:.3e}", 1.0 / (v * s)),
-        _ => "–".to_owned(),
-    };
     ConvergenceRow {
         estimator: c.estimator.clone(),
         renderer: c.renderer.clone(),
@@ -62,22 +56,42 @@ fn row(record: &Record, scene: &SceneRecord, c: &Convergence) -> ConvergenceRow 
         variance: last.map_or_else(String::new, |p| show(&p.variance)),
         slope: show(&c.slope),
         limit: show(&c.limit),
-        efficiency,
+        per_ray: show(&c.per_ray),
+        efficiency: last.zip(seconds).map_or_else(|| "–".to_owned(), |(p, s)| efficiency(&p.variance, s)),
         target: target(record, scene, c),
+    }
+}
+
+/// 1 / (variance x time) with the ends of the variance's interval, time taken as
+/// exact. An interval of variances that reaches 0 leaves it without an upper end.
+fn efficiency(variance: &Quantity, seconds: f64) -> String {
+    let of = |v: f64| if v > 0.0 { 1.0 / (v * seconds) } else { f64::INFINITY };
+    match variance.value.map(of) {
+        Some(value) if value.is_finite() && seconds > 0.0 => match variance.estimate().map(|e| e.interval(CONFIDENCE)) {
+            Some([lo, hi]) if of(lo).is_finite() => format!("{value:.3e} ({:.2e} to {:.2e})", of(hi), of(lo)),
+            Some([_, hi]) => format!("{value:.3e} ({:.2e} or more)", of(hi)),
+            None => format!("{value:.3e}"),
+        },
+        _ => "–".to_owned(),
     }
 }
 
 /// Rays and time of one replicate with the target's error.
 fn target(record: &Record, scene: &SceneRecord, c: &Convergence) -> String {
-    let rays = match c.rays_for(TARGET) {
-        Ok(rays) => rays,
-        Err(Absent(why)) => return if c.slope.value.is_some() { why } else { "–".to_owned() },
+    let Some(target) = &c.target else { return "–".to_owned() };
+    let Some(rays) = target.rays.value else {
+        let why = target.rays.note.as_ref().filter(|_| c.slope.value.is_some());
+        return why.map_or_else(|| "–".to_owned(), |why| format!("{}: {why}", target.rmse));
+    };
+    let text = match target.rays.estimate().map(|e| e.interval(CONFIDENCE)) {
+        Some([lo, hi]) => format!("{}: {rays:.1}\u{a0}±\u{a0}{:.1} rays", target.rmse, (hi - lo) / 2.0),
+        None => format!("{}: {rays:.1} rays", target.rmse),
     };
     let times: Option<Vec<(f64, f64)>> =
         c.points.iter().map(|p| Some((f64::from(p.rays), seconds(record, scene, c, p.rays)?))).collect();
     match times.and_then(|times| time_of(rays, &times)) {
-        Some(seconds) => format!("{rays:.1} rays, {:.2} ms", seconds * 1e3),
-        None => format!("{rays:.1} rays"),
+        Some(seconds) => format!("{text}, {:.2} ms", seconds * 1e3),
+        None => text,
     }
 }
 
@@ -112,6 +126,15 @@ fn show(q: &Quantity) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn efficiency_has_the_interval_of_its_variance() {
+        let of = |value, se| Quantity { value: Some(value), se: Some(se), df: Some(1e9), note: None };
+        // 1.96 standard errors of .01 beside .04: .0204 to .0596, over half a second.
+        assert_eq!(efficiency(&of(0.04, 0.01), 0.5), "5.000e1 (3.36e1 to 9.80e1)");
+        assert_eq!(efficiency(&of(0.04, 0.03), 0.5), "5.000e1 (2.02e1 or more)");
+        assert_eq!((efficiency(&of(0.0, 0.0), 0.5), efficiency(&of(0.04, 0.0), 0.0)), ("–".into(), "–".into()));
+    }
 
     #[test]
     fn times_follow_a_power_law() {

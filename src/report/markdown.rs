@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     gate::{CONFIDENCE, Outcome},
-    metrics::{Metric, MetricName, artifact::Brighter, convergence::TARGET, regions::Region},
+    metrics::{Metric, MetricName, artifact::Brighter, regions::Region},
     record::{CaseRecord, Record, SceneRecord, ScreenRecord, Stopped},
 };
 use minijinja::{Environment, syntax::SyntaxConfig, value::Serde};
@@ -27,7 +27,6 @@ struct Context<'a> {
     rows: Vec<Row>,
     pooled: Vec<PooledRow>,
     pooled_scenes: Vec<String>,
-    target: f64,
     verdicts: Vec<VerdictRow>,
     scenes: Vec<SceneSection>,
     judge_seconds: f64,
@@ -313,7 +312,6 @@ pub fn text(record: &Record) -> Result<String, minijinja::Error> {
         rows,
         pooled,
         pooled_scenes,
-        target: TARGET,
         verdicts,
         scenes,
         judge_seconds,

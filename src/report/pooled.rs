@@ -14,6 +14,9 @@ pub(super) struct PooledRow {
     estimator: String,
     renderer: String,
     rays: u32,
+    /// How many are in dK, and in removed where that differs.
+    scenes: String,
+    contrast: String,
     contrast_error: String,
     contrast_error_size: String,
     removed: String,
@@ -29,6 +32,8 @@ pub(super) fn rows(record: &Record) -> (Vec<PooledRow>, Vec<String>) {
         estimator: p.estimator.clone(),
         renderer: p.renderer.clone(),
         rays: p.rays,
+        scenes: count(p),
+        contrast: show(&p.contrast),
         contrast_error: show(&p.contrast_error),
         contrast_error_size: show(&p.contrast_error_size),
         removed: show(&p.removed),
@@ -40,6 +45,13 @@ pub(super) fn rows(record: &Record) -> (Vec<PooledRow>, Vec<String>) {
     (record.pooled.iter().map(row).collect(), scenes(&record.pooled))
 }
 
+/// How many scenes are in a row: `4`, or `4 / 3` where removed has fewer.
+fn count(p: &Pooled) -> String {
+    let (all, removed) = (p.contrast_error.scenes.len(), p.removed.scenes.len());
+    let pooled = removed > 0 || !p.removed.left_out.is_empty();
+    if pooled && removed != all { format!("{all} / {removed}") } else { all.to_string() }
+}
+
 fn show(pool: &Pool) -> String {
     pool.pooled.estimate().map_or_else(|| "–".to_owned(), |e| plus_minus(e.value, e.interval(CONFIDENCE)))
 }
@@ -47,7 +59,8 @@ fn show(pool: &Pool) -> String {
 /// What each column is taken over, a line a set of scenes, and who is left out why.
 fn scenes(pooled: &[Pooled]) -> Vec<String> {
     type Column = fn(&Pooled) -> &Pool;
-    let columns: [(&str, Column); 4] = [
+    let columns: [(&str, Column); 5] = [
+        ("K", |p| &p.contrast),
         ("dK", |p| &p.contrast_error),
         ("removed", |p| &p.removed),
         ("errors", |p| &p.rmse),
@@ -75,4 +88,32 @@ fn scenes(pooled: &[Pooled]) -> Vec<String> {
         }
     }
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pooled::LeftOut;
+
+    #[test]
+    fn rows_say_of_how_many_scenes_they_are() {
+        let pool = |n: usize| Pool { scenes: vec!["s".to_owned(); n], ..Pool::default() };
+        let row = |all, removed| Pooled {
+            estimator: "e".into(),
+            renderer: "cpu".into(),
+            rays: 4,
+            contrast: pool(all),
+            contrast_error: pool(all),
+            contrast_error_size: pool(all),
+            removed,
+            bias: pool(0),
+            mae: pool(0),
+            rmse: pool(0),
+            over_darkening: pool(0),
+        };
+        let out = |n| Pool { left_out: vec![LeftOut { scene: "s".into(), why: "w".into() }], ..pool(n) };
+        // Classic has no "removed" at all.
+        assert_eq!(count(&row(4, pool(0))), "4");
+        assert_eq!([count(&row(4, pool(4))), count(&row(4, out(3))), count(&row(4, out(0)))], ["4", "4 / 3", "4 / 0"]);
+    }
 }

@@ -109,7 +109,7 @@ impl Set<'_> {
                 keys.push(key);
             }
         }
-        let mut found = Vec::new();
+        let (mut found, target) = (Vec::new(), self.plan.suite.file.target_rmse);
         for (estimator, renderer) in keys {
             let of_key = |c: &&Case| c.estimator == estimator && c.renderer == renderer;
             let Some(index) = self.cases().find(of_key).map(|c| self.method(c)) else { continue };
@@ -124,7 +124,7 @@ impl Set<'_> {
                 }
                 let (levels, pixels) = (levels.clone(), regions.measurable(region));
                 let truth = &truths[index].converged;
-                found.push(convergence([estimator, renderer], region, levels, truth, pixels));
+                found.push(convergence([estimator, renderer], region, levels, truth, pixels, target));
             }
         }
         found

@@ -1,12 +1,11 @@
 //! Intervals of functions of means whose distribution is skew: the BCa bootstrap.
 
 use super::{
-    Group,
+    Group, SplitMix64,
     jackknife::{column_means, left_out},
     normal_quantile,
     spread::quantile_of_sorted,
 };
-use crate::render::sampler::{combine, hash};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 /// A bootstrap interval with what corrected it.
@@ -32,8 +31,8 @@ pub struct Bca {
 /// Each resample draws as many rows as a group has, with replacement, within each
 /// group; rows stay whole. The interval is between two quantiles of the resampled
 /// values (type 7, as in [`Spread`](super::Spread)), at the levels of
-/// [`bca_levels`]. At 95 % take 2,000 resamples or more. The draws depend on `seed`,
-/// resample, group and row only, so the result is the same everywhere.
+/// [`bca_levels`]. At 95 % take 2,000 resamples or more. The draws depend on `seed`
+/// and resample only ([`SplitMix64`]), so the result is the same everywhere.
 ///
 /// Resampled values that are NaN are left out. Where none is left, or the value is
 /// NaN, the interval is the whole line. Where all are equal it is that point. A group
@@ -45,7 +44,7 @@ pub struct Bca {
 pub fn bca(groups: &[Group], f: impl Fn(&[Vec<f64>]) -> f64, confidence: f64, resamples: u32, seed: u32) -> Bca {
     let value = f(&groups.iter().map(column_means).collect::<Vec<_>>());
     let mut values: Vec<f64> =
-        (0..resamples).map(|i| f(&resampled(groups, combine(seed, i)))).filter(|v| !v.is_nan()).collect();
+        (0..resamples).map(|i| f(&resampled(groups, draws(seed, i)))).filter(|v| !v.is_nan()).collect();
     values.sort_by(f64::total_cmp);
     let z0 = bias_correction(&values, value);
     let acceleration = acceleration(groups, &f);
@@ -58,15 +57,19 @@ pub fn bca(groups: &[Group], f: impl Fn(&[Vec<f64>]) -> f64, confidence: f64, re
     Bca { value, interval, z0, acceleration, resamples: values.len() as u32 }
 }
 
-/// Means of each group over rows drawn with replacement. A row's chance is 1/n to
-/// within n / 2^32.
-fn resampled(groups: &[Group], seed: u32) -> Vec<Vec<f64>> {
-    let of_group = |(g, rows): (usize, &Group)| {
-        let (n, seed) = (rows.len(), combine(seed, g as u32));
+/// The draws of one resample.
+fn draws(seed: u32, resample: u32) -> SplitMix64 {
+    SplitMix64(u64::from(seed) << 32 | u64::from(resample))
+}
+
+/// Means of each group over rows drawn with replacement.
+fn resampled(groups: &[Group], mut random: SplitMix64) -> Vec<Vec<f64>> {
+    let of_group = |rows: &Group| {
+        let n = rows.len();
         let mut means = vec![0.0; rows.first().map_or(0, Vec::len)];
-        for i in 0..n {
-            let row = (u64::from(hash(combine(seed, i as u32))) * n as u64) >> 32;
-            for (mean, v) in means.iter_mut().zip(&rows[row as usize]) {
+        for _ in 0..n {
+            let row = random.below(n);
+            for (mean, v) in means.iter_mut().zip(&rows[row]) {
                 *mean += v;
             }
         }
@@ -75,7 +78,7 @@ fn resampled(groups: &[Group], seed: u32) -> Vec<Vec<f64>> {
         }
         means
     };
-    groups.iter().enumerate().map(of_group).collect()
+    groups.iter().map(of_group).collect()
 }
 
 /// z0 = the normal quantile of the share of `values` below `value`, ties counted

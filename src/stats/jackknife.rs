@@ -71,7 +71,7 @@ pub(super) fn left_out(rows: &Group, g: usize, means: &mut [Vec<f64>], f: &impl 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::sampler::Sampler;
+    use crate::stats::SplitMix64;
 
     #[test]
     fn the_jackknife_of_a_mean_is_its_standard_error() {
@@ -89,18 +89,12 @@ mod tests {
     /// 96.6 %. Seeds are fixed.
     #[test]
     fn the_interval_of_a_ratio_covers() {
-        let draw = |i: u32, salt: u32| -> Group {
-            (0..16)
-                .map(|r| {
-                    let sampler = Sampler::new(salt, i, r);
-                    let sum: f32 = (0..8).map(|k| sampler.pair(0, k)[0]).sum();
-                    vec![f64::from(sum) / 8.0]
-                })
-                .collect()
-        };
+        let mut random = SplitMix64(1);
+        let mut draw =
+            || -> Group { (0..16).map(|_| vec![(0..8).map(|_| random.uniform()).sum::<f64>() / 8.0]).collect() };
         let covered = (0..2000)
-            .filter(|&i| {
-                let [lo, hi] = jackknife(&[draw(i, 1), draw(i, 2)], |m| m[0][0] / m[1][0]).interval(0.95);
+            .filter(|_| {
+                let [lo, hi] = jackknife(&[draw(), draw()], |m| m[0][0] / m[1][0]).interval(0.95);
                 lo <= 1.0 && 1.0 <= hi
             })
             .count();

@@ -10,6 +10,7 @@ mod equivalence;
 mod jackknife;
 mod moments;
 mod multiplicity;
+mod random;
 mod regression;
 mod scales;
 mod share;
@@ -25,6 +26,7 @@ pub use equivalence::{Better, non_inferior, tost};
 pub use jackknife::{Group, jackknife, jackknife_of};
 pub use moments::Moments;
 pub use multiplicity::{benjamini_hochberg, holm, sidak, sidak_alpha};
+pub use random::SplitMix64;
 pub use regression::{Line, RegressionError, log_log_slope, regress};
 pub use scales::{
     Difference, ImageSample, IndependentPixels, POWER, Replicates, Scale, ScaleTest, TILE, pixel_p_values, three_scales,
@@ -95,7 +97,8 @@ impl Estimate {
     /// Bloom, "Minimum Detectable Effects", Evaluation Review 19(5), 1995. It takes
     /// t shifted for noncentral t: below 4 degrees of freedom it is a guide.
     ///
-    /// A standard error of zero sees everything, 0. One that is unknown (NaN, or no
+    /// A standard error of zero gives 0: what is known exactly hides nothing. Where it is
+    /// zero because no replicate happened to differ, nothing is known: leave it unsaid. One that is unknown (NaN, or no
     /// degrees of freedom), or levels outside (0, 1), sees nothing: infinity.
     ///
     /// ```

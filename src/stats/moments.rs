@@ -143,10 +143,11 @@ impl FromIterator<f64> for Moments {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{render::sampler::hash, stats::mean_variance};
+    use crate::stats::{SplitMix64, mean_variance};
 
     fn noise(n: u32) -> impl Iterator<Item = f64> + Clone {
-        (0..n).map(|i| f64::from(hash(i)) / f64::from(u32::MAX))
+        let mut random = SplitMix64(3);
+        (0..n).map(move |_| random.uniform())
     }
 
     fn relative(a: f64, b: f64) -> f64 {

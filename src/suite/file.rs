@@ -40,6 +40,10 @@ pub struct SuiteFile {
     /// Rays and paths a pixel in pictures.
     #[serde(default = "look_rays")]
     pub look_rays: Rays,
+    /// The RMSE whose rays and time are told of each method: 1e-6 to 1.
+    #[serde(default = "target", deserialize_with = "rmse")]
+    #[schemars(extend("minimum" = 1e-6, "maximum" = 1))]
+    pub target_rmse: f64,
     /// How precise the judge must be.
     #[serde(default)]
     pub judge: JudgeSettings,
@@ -56,6 +60,19 @@ pub struct SuiteFile {
 
 fn one() -> u32 {
     1
+}
+
+fn target() -> f64 {
+    crate::metrics::convergence::TARGET
+}
+
+fn rmse<'de, D: Deserializer<'de>>(d: D) -> Result<f64, D::Error> {
+    let value = f64::deserialize(d)?;
+    if (1e-6..=1.0).contains(&value) {
+        Ok(value)
+    } else {
+        Err(D::Error::custom(format!("target_rmse is {value}: it must be 1e-6 to 1")))
+    }
 }
 
 fn look_rays() -> Rays {

@@ -255,7 +255,8 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_named() {
-        assert!(with("").is_ok());
+        assert_eq!(with("").unwrap().file.target_rmse, 0.01);
+        assert_eq!(with("target_rmse = 0.05").unwrap().file.target_rmse, 0.05);
         for (extra, says) in [
             ("colour = 1", "colour"),
             ("name = ''", "name: '' is not a legal name"),
@@ -263,6 +264,8 @@ mod tests {
             ("name = 'a # b'", "legal name"),
             ("golden_rays = 0", "line 6"),
             ("golden_rays = 5", "not among rays"),
+            ("target_rmse = 0", "target_rmse is 0: it must be 1e-6 to 1"),
+            ("target_rmse = nan", "1e-6 to 1"),
             ("judge = { precision = 0 }", "line 6"),
             ("judge = { replicates = 64, max_replicates = 32 }", "max_replicates"),
             ("[[estimator]]\nname = '../x'\nkind = 'classic'", "legal name"),
