@@ -433,7 +433,7 @@ fail = ["flip<=0.2"]
     fn mistakes_in_a_file_name_the_line() {
         for (text, line, message) in [
             ("fail = [\"flip<=0.05\"]\nwarm = []\n", "line 2", "unknown field `warm`"),
-            ("fail = [\"flip<=0.05\",\n  \"flap<=1\"]\n", "line 2", "there is no 'flap'"),
+            ("\nfail = [\"flip<=0.05\",\n  \"flap<=1\"]\n", "line 2", "there is no 'flap'"),
             ("\n[[override]]\npath = \"a[\"\n", "line 3", "no pattern of paths"),
             ("[[override]]\nfail = []\n", "line 1", "missing field `path`"),
             ("fail = [\"ssimulacra2>=90\"]", "line 1", "reported and has no limit"),
