@@ -321,13 +321,7 @@ mod tests {
         measure_for(0.05, salt, bias, rays, deviation)
     }
 
-    fn measure_for(
-        target: f64,
-        salt: u32,
-        bias: f64,
-        rays: &[u32],
-        deviation: impl Fn(f64) -> f64,
-    ) -> Convergence {
+    fn measure_for(target: f64, salt: u32, bias: f64, rays: &[u32], deviation: impl Fn(f64) -> f64) -> Convergence {
         let salt = salt * 16;
         let own: Vec<Vec<Vec<f32>>> =
             (1..).zip(rays).map(|(i, &n)| images(salt + i, 8, bias, deviation(f64::from(n)))).collect();

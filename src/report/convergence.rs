@@ -67,11 +67,13 @@ fn row(record: &Record, scene: &SceneRecord, c: &Convergence) -> ConvergenceRow 
 fn efficiency(variance: &Quantity, seconds: f64) -> String {
     let of = |v: f64| if v > 0.0 { 1.0 / (v * seconds) } else { f64::INFINITY };
     match variance.value.map(of) {
-        Some(value) if value.is_finite() && seconds > 0.0 => match variance.estimate().map(|e| e.interval(CONFIDENCE)) {
-            Some([lo, hi]) if of(lo).is_finite() => format!("{value:.3e} ({:.2e} to {:.2e})", of(hi), of(lo)),
-            Some([_, hi]) => format!("{value:.3e} ({:.2e} or more)", of(hi)),
-            None => format!("{value:.3e}"),
-        },
+        Some(value) if value.is_finite() && seconds > 0.0 => {
+            match variance.estimate().map(|e| e.interval(CONFIDENCE)) {
+                Some([lo, hi]) if of(lo).is_finite() => format!("{value:.3e} ({:.2e} to {:.2e})", of(hi), of(lo)),
+                Some([_, hi]) => format!("{value:.3e} ({:.2e} or more)", of(hi)),
+                None => format!("{value:.3e}"),
+            }
+        }
         _ => "–".to_owned(),
     }
 }
