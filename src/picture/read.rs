@@ -241,6 +241,10 @@ fn reader<'a>(path: &Path, bytes: &'a [u8]) -> Result<ImageReader<Cursor<&'a [u8
     Ok(reader)
 }
 
+/// What decoding a PNG of 7680 x 4320 RGB takes, 19 MB, milliseconds: this 88 to 102, the
+/// crate `png` without checksums 90 to 100, row by row into no image 55 to 61 (the rest
+/// is fresh memory), `zune-png` 172 to 256, `zlib-rs` without undoing filters 94 to 102.
+/// So checksums stay on, and there is no decoder beside `image`'s.
 fn decode_dynamic(path: &Path, bytes: &[u8]) -> Result<DynamicImage, DiskError> {
     let decoded = reader(path, bytes)?.decode().map_err(|e| broken(path, &e))?;
     with_pixels(path, [decoded.width() as usize, decoded.height() as usize])?;
