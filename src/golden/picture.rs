@@ -7,7 +7,7 @@ use crate::{
     metrics::image::{DEFAULT_PPD, Encoding, Image, Pair, flip, signed_map},
     picture::{
         error_map::{Caption, ErrorMap},
-        read::read,
+        read::{Values, decode_samples, load, read},
         scale::Scale,
     },
 };
@@ -108,9 +108,13 @@ impl Picture {
     pub(super) fn read_alike(&self, path: &Path) -> Result<Picture, DiskError> {
         match self {
             Picture::Rgb(_) => {
-                let image = image::open(path)
-                    .map_err(|e| DiskError::content(path, format!("not a readable image{}: {e}", lfs(path))))?;
-                Ok(Picture::Rgb(image.into_rgb8()))
+                let samples = decode_samples(path, &load(path)?)?;
+                let [width, height] = samples.size.map(|n| n as u32);
+                let image = match (samples.channels, samples.values) {
+                    (3, Values::U8(bytes)) => RgbImage::from_raw(width, height, bytes),
+                    _ => None,
+                };
+                image.map(Picture::Rgb).ok_or_else(|| DiskError::content(path, "this is no 8-bit RGB image"))
             }
             Picture::Planes(image) => Ok(Picture::Planes(read(path, None, Some(image.encoding()))?.image)),
             Picture::Sampled(_) => {
@@ -250,9 +254,4 @@ impl Picture {
         });
         write_png(path, &picture)
     }
-}
-
-fn lfs(path: &Path) -> &'static str {
-    let pointer = std::fs::read(path).is_ok_and(|b| b.starts_with(b"version https://git-lfs"));
-    if pointer { " but a Git LFS pointer: run `git lfs pull`" } else { "" }
 }
