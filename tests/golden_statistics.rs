@@ -9,6 +9,7 @@ use aogauge::{
     scenes::{Scene, library},
     stats::mean_variance,
 };
+use rayon::prelude::*;
 use std::{collections::BTreeMap, time::Instant};
 
 const REPLICATES: usize = 16;
@@ -83,20 +84,17 @@ fn refs(replicates: &[Vec<f32>]) -> Vec<&[f32]> {
 #[test]
 fn resamplings_of_replicates_are_refused_at_most_at_the_stated_rate() {
     let all = Curtain::new().render(64, 11, 2 * REPLICATES);
-    let mut random = Random(3);
-    let [mut at_five, mut at_one] = [0, 0];
-    let mut deal: Vec<&[f32]> = refs(&all);
-    for _ in 0..1000 {
+    let refused = |seed: u64| {
+        let (mut random, mut deal) = (Random(seed), refs(&all));
         for i in (1..deal.len()).rev() {
             deal.swap(i, random.below(i + 1));
         }
         let (golden, image) = (sampled(64, &deal[..REPLICATES], 1), sampled(64, &deal[REPLICATES..], 2));
         // What holds at .05 holds at .01.
-        if !held(&golden, &image, 0.05).passes() {
-            at_five += 1;
-            at_one += usize::from(!held(&golden, &image, 0.01).passes());
-        }
-    }
+        let at_five = !held(&golden, &image, 0.05).passes();
+        [at_five, at_five && !held(&golden, &image, 0.01).passes()].map(usize::from)
+    };
+    let [at_five, at_one] = (0..1000).into_par_iter().map(refused).reduce(|| [0; 2], |[a, b], [c, d]| [a + c, b + d]);
     println!("refused of 1,000 resamplings: {at_five} at .05, {at_one} at .01");
     assert!(at_five <= 73 && at_one <= 21, "{at_five} at .05, {at_one} at .01");
 }
