@@ -7,29 +7,13 @@ use aogauge::{
     metrics::regions::Region,
     render::{Estimator, Geometry, Job, Renderer, cpu::Cpu},
     scenes::{Scene, library},
-    stats::mean_variance,
+    stats::{SplitMix64, mean_variance},
 };
 use rayon::prelude::*;
 use std::{collections::BTreeMap, time::Instant};
 
 const REPLICATES: usize = 16;
 const RAYS: u32 = 32;
-
-/// SplitMix64 (Steele, Lea and Flood 2014).
-struct Random(u64);
-
-impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.bits() % n as u64) as usize
-    }
-}
 
 /// What a record keeps of replicates.
 fn sampled(side: u32, replicates: &[&[f32]], seed: u32) -> Sampled {
@@ -85,7 +69,7 @@ fn refs(replicates: &[Vec<f32>]) -> Vec<&[f32]> {
 fn resamplings_of_replicates_are_refused_at_most_at_the_stated_rate() {
     let all = Curtain::new().render(64, 11, 2 * REPLICATES);
     let refused = |seed: u64| {
-        let (mut random, mut deal) = (Random(seed), refs(&all));
+        let (mut random, mut deal) = (SplitMix64(seed), refs(&all));
         for i in (1..deal.len()).rev() {
             deal.swap(i, random.below(i + 1));
         }
@@ -130,7 +114,7 @@ fn fresh_renders_are_refused_at_most_at_the_stated_rate() {
 #[test]
 fn a_shift_of_three_thousandths_is_caught() {
     let side = 256;
-    let mut random = Random(9);
+    let mut random = SplitMix64(9);
     // Openness of a slope, .3 to .9.
     let p = |i: usize| 0.3 + 0.6 * (i % side) as f64 / side as f64;
     let mut drawn = |shift: f64, seed: u32| {
@@ -155,7 +139,7 @@ fn a_shift_of_three_thousandths_is_caught() {
 
 /// The open share of 32 rays that are each open with probability `p`: bits of `p`
 /// decided for 32 rays at a time, from the lowest of 16.
-fn binomial(random: &mut Random, p: f64) -> f32 {
+fn binomial(random: &mut SplitMix64, p: f64) -> f32 {
     let bits = (p * 65_536.0) as u32;
     let mut open = 0u32;
     for k in 0..16 {

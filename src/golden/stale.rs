@@ -110,11 +110,8 @@ mod tests {
     /// discrete: its true level there is .0072.
     #[test]
     fn independent_faults_are_rarely_called_stale() {
-        let mut state = 7u64;
-        let mut sign = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            if state >> 63 == 0 { 0.01 } else { -0.01 }
-        };
+        let mut random = crate::stats::SplitMix64(7);
+        let mut sign = || if random.bits() >> 63 == 0 { 0.01 } else { -0.01 };
         let alarms = (0..4000).filter(|_| of_signs(21, &(0..21).map(|_| sign()).collect::<Vec<_>>()).is_some()).count();
         assert!((10..=52).contains(&alarms), "{alarms} of 4000");
     }
