@@ -561,12 +561,15 @@ fn without_an_adapter_the_doctor_says_what_to_install() {
 
 #[test]
 fn every_verb_shows_an_example() {
-    let verbs: [&[&str]; 10] = [
+    let verbs: [&[&str]; 13] = [
         &[],
         &["run"],
         &["report"],
         &["golden", "approve"],
         &["golden", "verify"],
+        &["golden", "list"],
+        &["golden", "prune"],
+        &["golden", "size"],
         &["scene", "list"],
         &["scene", "show"],
         &["scene", "export"],

@@ -90,5 +90,8 @@ fn the_built_in_suite_keeps_its_promises() {
     let fresh = folder.path().join("seed-2026");
     run(&fresh, &["--seed", "2026", "--renderer", "cpu"]);
     let text = verify(&fresh);
-    assert_eq!(text.lines().filter(|l| l.contains("fresh seeds")).count(), 21, "{text}");
+    // On the plane some methods have no noise: every seed gives the same pixels.
+    let count = |what: &str| text.lines().filter(|l| l.contains("/cpu/") && l.contains(what)).count();
+    assert!(count("fresh seeds") >= 18, "{text}");
+    assert_eq!(count("fresh seeds") + count("identical"), 21, "{text}");
 }

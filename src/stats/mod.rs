@@ -10,6 +10,7 @@ mod equivalence;
 mod jackknife;
 mod moments;
 mod multiplicity;
+mod noise;
 mod random;
 mod regression;
 mod scales;
@@ -26,6 +27,7 @@ pub use equivalence::{Better, non_inferior, tost};
 pub use jackknife::{Group, jackknife, jackknife_of};
 pub use moments::Moments;
 pub use multiplicity::{benjamini_hochberg, holm, sidak, sidak_alpha};
+pub use noise::{Noise, noise_of_pixels, noise_of_replicates, unexplained};
 pub use random::SplitMix64;
 pub use regression::{Line, RegressionError, log_log_slope, regress};
 pub use scales::{

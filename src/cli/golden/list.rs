@@ -1,0 +1,65 @@
+//! `aogauge golden list`
+
+use super::{Exit, Failure, Format, bytes, json, print, tell};
+use crate::golden::{Entry, Store};
+use std::path::PathBuf;
+
+/// List goldens with where they come from.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  aogauge golden list\n  aogauge golden list --only curtain --format json")]
+pub struct Args {
+    /// Only goldens whose scene/estimator.rays.name contains this.
+    #[arg(long, default_value = "")]
+    only: String,
+    /// The folder of goldens.
+    #[arg(long, default_value = "goldens")]
+    goldens: PathBuf,
+    /// How they are printed.
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
+    let mut entries = Store::new(&args.goldens).entries()?;
+    entries.retain(|e| e.slot.path().to_string_lossy().replace('\\', "/").contains(&args.only));
+    if entries.is_empty() {
+        let message = format!("{} holds no golden that contains '{}'", args.goldens.display(), args.only);
+        return Err(Failure { exit: Exit::Nothing, message });
+    }
+    match args.format {
+        Format::Json => print(&json(&entries)?)?,
+        Format::Text => print(&table(&entries))?,
+    }
+    let broken = entries.iter().filter(|e| e.golden.is_err()).count();
+    let total: u64 = entries.iter().map(|e| e.bytes).sum();
+    tell(&format!("{} goldens, {}; {broken} cannot be read", entries.len(), bytes(total)));
+    Ok(if broken > 0 { Exit::Golden } else { Exit::Pass })
+}
+
+fn table(entries: &[Entry]) -> String {
+    let row = |e: &Entry| {
+        let rest = match &e.golden {
+            Err(why) => format!("UNREADABLE  {why}"),
+            Ok(about) => {
+                let (of, from) = (&about.identity, &about.provenance);
+                let [width, height] = of.resolution;
+                let tolerance = about.tolerance.as_ref().map_or_else(String::new, |t| format!("  tolerance {t}"));
+                format!(
+                    "{:<11} {:>3} x {:<5} seed {:<6} {} on {}, aogauge {}{tolerance}\n{:60}{}",
+                    format!("{width} x {height}"),
+                    from.replicates,
+                    of.rays,
+                    from.seed,
+                    from.renderer,
+                    from.device,
+                    from.tool,
+                    "",
+                    from.reason
+                )
+            }
+        };
+        let path = e.slot.path().display().to_string();
+        format!("{path:<48} {:>10} {rest}\n", bytes(e.bytes))
+    };
+    entries.iter().map(row).collect()
+}

@@ -1,0 +1,55 @@
+//! `aogauge golden`
+
+mod approve;
+mod list;
+mod prune;
+mod size;
+mod verify;
+
+use super::{Exit, Failure, Format, json, print, tell};
+use crate::record::Record;
+use clap::Subcommand;
+
+/// Accept images as goldens, and hold records against them.
+#[derive(Debug, Subcommand)]
+pub enum Verb {
+    Verify(verify::Args),
+    Approve(approve::Args),
+    List(list::Args),
+    Prune(prune::Args),
+    Size(size::Args),
+}
+
+pub fn execute(verb: &Verb) -> Result<Exit, Failure> {
+    match verb {
+        Verb::Verify(args) => verify::execute(args),
+        Verb::Approve(args) => approve::execute(args),
+        Verb::List(args) => list::execute(args),
+        Verb::Prune(args) => prune::execute(args),
+        Verb::Size(args) => size::execute(args),
+    }
+}
+
+fn nothing(record: &Record, only: &str) -> Failure {
+    let message = match record.suite.golden_rays {
+        None => format!("suite '{}' keeps no goldens: it sets no golden_rays", record.suite.name),
+        Some(rays) => format!("the record has no case at {rays} rays that contains '{only}'"),
+    };
+    Failure { exit: Exit::Nothing, message }
+}
+
+/// Says that another change of the store is waited for.
+fn waiting() {
+    tell("aogauge: another command reads or changes the goldens; waiting for it to end");
+}
+
+/// Bytes for people, by powers of 1,000.
+fn bytes(n: u64) -> String {
+    let (value, unit) = match n {
+        0..1_000 => return format!("{n} B"),
+        1_000..1_000_000 => (n as f64 / 1e3, "kB"),
+        1_000_000..1_000_000_000 => (n as f64 / 1e6, "MB"),
+        _ => (n as f64 / 1e9, "GB"),
+    };
+    format!("{value:.1} {unit}")
+}

@@ -1,0 +1,86 @@
+//! `aogauge golden size`
+
+use super::{Exit, Failure, Format, bytes, json, print, tell};
+use crate::golden::Store;
+use serde::Serialize;
+use std::{collections::BTreeMap, path::PathBuf};
+
+/// Beyond this a repository is slow to clone.
+const LARGE: u64 = 50_000_000;
+
+/// Show how much goldens hold, by scene, and warn before the repository grows.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  aogauge golden size\n  aogauge golden size --limit 20MB")]
+pub struct Args {
+    /// Exit with 1 above this: bytes, or a number with kB, MB, GB, KiB, MiB or GiB.
+    #[arg(long, value_parser = parse)]
+    limit: Option<u64>,
+    /// The folder of goldens.
+    #[arg(long, default_value = "goldens")]
+    goldens: PathBuf,
+    /// How the sizes are printed.
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+#[derive(Serialize)]
+struct Sizes {
+    total: u64,
+    limit: Option<u64>,
+    scenes: BTreeMap<String, u64>,
+}
+
+pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
+    let scenes = Store::new(&args.goldens).sizes()?;
+    let sizes = Sizes { total: scenes.values().sum(), limit: args.limit, scenes };
+    match args.format {
+        Format::Json => print(&json(&sizes)?)?,
+        Format::Text => {
+            for (scene, size) in &sizes.scenes {
+                print(&format!("{:>10}  {scene}\n", bytes(*size)))?;
+            }
+            print(&format!("{:>10}  all\n", bytes(sizes.total)))?;
+        }
+    }
+    let above = args.limit.is_some_and(|limit| sizes.total > limit);
+    if above || args.limit.is_none() && sizes.total > LARGE {
+        let limit = bytes(args.limit.unwrap_or(LARGE));
+        tell(&format!(
+            "goldens hold {}, more than {limit}: every clone carries them and their history; prune, take smaller views, or keep them in Git LFS",
+            bytes(sizes.total)
+        ));
+    }
+    Ok(if above { Exit::Failed } else { Exit::Pass })
+}
+
+fn parse(text: &str) -> Result<u64, String> {
+    let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+    let (number, unit) = text.split_at(digits);
+    let factor = match unit.trim() {
+        "" | "B" => 1.0,
+        "kB" => 1e3,
+        "MB" => 1e6,
+        "GB" => 1e9,
+        "KiB" => 1024.0,
+        "MiB" => 1_048_576.0,
+        "GiB" => 1_073_741_824.0,
+        _ => return Err("give bytes, or a number with kB, MB, GB, KiB, MiB or GiB".into()),
+    };
+    let value: f64 = number.parse().map_err(|_| "give a number of 0 or more".to_owned())?;
+    Ok((value * factor) as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parse;
+
+    #[test]
+    fn sizes_have_units() {
+        for (text, n) in [("0", 0), ("20MB", 20_000_000), ("1.5 KiB", 1536), ("2GiB", 2 << 30), ("7B", 7)] {
+            assert_eq!(parse(text), Ok(n));
+        }
+        for bad in ["", "MB", "-1", "5 parsecs", "1.2.3"] {
+            assert!(parse(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! `aogauge golden verify`
+
+use super::{Exit, Failure, Format, json, nothing, print, tell};
+use crate::{
+    golden::{ALPHA, Candidates, Outcome, Store, Verification},
+    record::Record,
+};
+use std::path::PathBuf;
+
+/// Hold the images of a record against their goldens, without rendering. A
+/// missing golden is never created, and never passes.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  aogauge run --seed 7 --out /tmp/fresh && aogauge golden verify /tmp/fresh\n  \
+aogauge golden verify artifact.zip --only curtain-room --format json\n\n\
+docs/goldens.md tells what each verdict means.")]
+pub struct Args {
+    /// The record's folder, or a zip file that holds one.
+    record: PathBuf,
+    /// Only cases whose scene/estimator/renderer/rays contains this.
+    #[arg(long, default_value = "")]
+    only: String,
+    /// The folder of goldens.
+    #[arg(long, default_value = "goldens")]
+    goldens: PathBuf,
+    /// How the verdicts are printed.
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
+    let candidates = Candidates::open(&args.record)?;
+    let record = Record::read(candidates.folder())?;
+    let found = Store::new(&args.goldens).verify(candidates.folder(), &record, &args.only)?;
+    if found.cases.is_empty() {
+        return Err(nothing(&record, &args.only));
+    }
+    if args.format == Format::Json {
+        print(&json(&found)?)?;
+    }
+    for case in &found.cases {
+        tell(&case.line());
+    }
+    let [pass, fail, blind, missing, lost] =
+        [Outcome::Pass, Outcome::Fail, Outcome::Blind, Outcome::Missing, Outcome::Lost].map(|o| found.count(o));
+    tell(&format!(
+        "{pass} hold, {fail} differ, {blind} too noisy to tell, {missing} missing or unusable, {lost} lost; family error {ALPHA}"
+    ));
+    if let Some(stale) = &found.stale {
+        tell(&stale.line());
+    }
+    if found.interrupted {
+        tell("an approval was cut short after it was decided and counts as made; the next approval finishes it");
+    }
+    Ok(exit(&found))
+}
+
+fn exit(found: &Verification) -> Exit {
+    let ends = [
+        (Outcome::Lost, Exit::Incomplete),
+        (Outcome::Missing, Exit::Golden),
+        (Outcome::Fail, Exit::Failed),
+        (Outcome::Blind, Exit::Inconclusive),
+    ];
+    ends.into_iter().find(|(outcome, _)| found.count(*outcome) > 0).map_or(Exit::Pass, |(_, exit)| exit)
+}

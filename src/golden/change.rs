@@ -1,0 +1,361 @@
+//! Changes of a store that are whole or not there at all, one at a time.
+//!
+//! All of it lies in the store's folder `.approval`, which git does not see:
+//! - `lock`: locked by who changes the store, shared by who reads it. The system lets
+//!   go of it when its holder ends, however that ends.
+//! - `staged/0.exr`...: new files, on the same disk, synced.
+//! - `journal.json`: what is to be moved and removed. Its rename into place is the
+//!   decision: before it the store is the old one, from then on the new one. Who reads
+//!   a store with a journal sees its moves as made; who changes it makes them first.
+
+use crate::{
+    disk::{DiskError, read_text, write_whole},
+    layers::Layers,
+};
+use serde::{Deserialize, Serialize};
+use std::{
+    fs::{self, File, TryLockError},
+    io::{self, Write},
+    path::{Component, Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+/// The folder of everything that is no golden.
+const FOLDER: &str = ".approval";
+/// How long a change waits before it says so.
+const PATIENCE: Duration = Duration::from_secs(1);
+/// How often it looks meanwhile.
+const STEP: Duration = Duration::from_millis(10);
+/// A journal larger than this is none of ours.
+const LARGEST_JOURNAL: u64 = 64 << 20;
+
+#[derive(Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Journal {
+    /// Names in `staged`, and files in the store.
+    moves: Vec<(String, PathBuf)>,
+    /// Files in the store.
+    removals: Vec<PathBuf>,
+}
+
+/// What a journal changes of what lies in the store.
+#[derive(Debug, Default)]
+pub(super) struct Overlay {
+    /// Files in the store and where their content lies.
+    pub moved: Vec<(PathBuf, PathBuf)>,
+    /// Files in the store that count as removed.
+    pub removed: Vec<PathBuf>,
+    /// Whether there is a journal.
+    pub interrupted: bool,
+}
+
+/// New goldens and removals, made at once by [`Change::commit`]. Dropped before, it
+/// changes nothing.
+#[derive(Debug)]
+pub struct Change {
+    store: PathBuf,
+    journal: Journal,
+    /// Held until the end.
+    _lock: File,
+}
+
+fn lock_path(store: &Path) -> PathBuf {
+    store.join(FOLDER).join("lock")
+}
+
+fn staged(store: &Path) -> PathBuf {
+    store.join(FOLDER).join("staged")
+}
+
+fn journal_path(store: &Path) -> PathBuf {
+    store.join(FOLDER).join("journal.json")
+}
+
+/// Whether any change was ever made or begun here.
+pub(super) fn has_lock(store: &Path) -> bool {
+    lock_path(store).exists()
+}
+
+/// The lock shared with other readers; None where there was no change here ever.
+pub(super) fn lock_to_read(store: &Path) -> Result<Option<File>, DiskError> {
+    let path = lock_path(store);
+    let file = match File::open(&path) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
+        file => file.map_err(DiskError::io(&path, "open the store's lock"))?,
+    };
+    match file.lock_shared() {
+        // Where files cannot be locked, no approval can be under way.
+        Err(e) if e.kind() == io::ErrorKind::Unsupported => {}
+        locked => locked.map_err(DiskError::io(&path, "lock the store"))?,
+    }
+    Ok(Some(file))
+}
+
+impl Journal {
+    /// None where there is none.
+    fn read(store: &Path) -> Result<Option<Self>, DiskError> {
+        let path = journal_path(store);
+        match fs::metadata(&path) {
+            Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
+            meta => {
+                if meta.map_err(DiskError::io(&path, "read the journal"))?.len() > LARGEST_JOURNAL {
+                    return Err(DiskError::content(&path, "this is no journal of aogauge: it is too large"));
+                }
+            }
+        }
+        let journal: Journal = serde_json::from_str(&read_text(&path)?)
+            .map_err(|e| DiskError::content(&path, format!("this is no journal of aogauge: {e}")))?;
+        // A store may come from anybody: nothing it says leads out of it.
+        let is_golden = |p: &Path| {
+            p.components().count() == 2
+                && p.components().all(|c| matches!(c, Component::Normal(n) if !n.to_string_lossy().starts_with('.')))
+        };
+        let is_staged = |n: &str| n.strip_suffix(".exr").is_some_and(|n| n.bytes().all(|b| b.is_ascii_digit()));
+        let fits = journal.moves.iter().all(|(from, to)| is_staged(from) && is_golden(to))
+            && journal.removals.iter().all(|r| is_golden(r));
+        if !fits {
+            return Err(DiskError::content(&path, "the journal names files that are no goldens of this store"));
+        }
+        Ok(Some(journal))
+    }
+
+    /// Makes the moves and removals that are not made yet, then forgets them. May be cut
+    /// short anywhere and begun again.
+    fn apply(&self, store: &Path) -> Result<(), DiskError> {
+        for (from, to) in &self.moves {
+            let (from, to) = (staged(store).join(from), store.join(to));
+            if !from.exists() {
+                continue;
+            }
+            if let Some(scene) = to.parent() {
+                fs::create_dir_all(scene).map_err(DiskError::io(scene, "create the folder"))?;
+                fs::rename(&from, &to).map_err(DiskError::io(&to, "put the golden in its place"))?;
+                sync(scene)?;
+            }
+        }
+        for file in &self.removals {
+            let file = store.join(file);
+            match fs::remove_file(&file) {
+                Err(e) if e.kind() == io::ErrorKind::NotFound => {}
+                removed => removed.map_err(DiskError::io(&file, "remove the golden"))?,
+            }
+            if let Some(scene) = file.parent() {
+                // Refused where others are left.
+                let _ = fs::remove_dir(scene);
+            }
+        }
+        sync(store)?;
+        let path = journal_path(store);
+        fs::remove_file(&path).map_err(DiskError::io(&path, "remove the journal"))?;
+        clear(store)
+    }
+}
+
+impl Overlay {
+    pub(super) fn read(store: &Path) -> Result<Self, DiskError> {
+        let Some(journal) = Journal::read(store)? else {
+            return Ok(Overlay::default());
+        };
+        let moved = journal.moves.into_iter().map(|(from, to)| (to, staged(store).join(from)));
+        Ok(Overlay {
+            moved: moved.filter(|(_, from)| from.exists()).collect(),
+            removed: journal.removals,
+            interrupted: true,
+        })
+    }
+}
+
+impl Change {
+    pub(super) fn begin(store: &Path, waiting: &dyn Fn()) -> Result<Self, DiskError> {
+        let folder = store.join(FOLDER);
+        fs::create_dir_all(&folder).map_err(DiskError::io(&folder, "create the folder"))?;
+        let ignore = folder.join(".gitignore");
+        if !ignore.exists() {
+            write_whole(&ignore, |b| b.write_all(b"*\n"))?;
+        }
+        let path = lock_path(store);
+        let mut open = File::options();
+        let file = open.create(true).truncate(false).write(true).open(&path);
+        let lock = file.map_err(DiskError::io(&path, "open the store's lock"))?;
+        wait(&lock, waiting).map_err(DiskError::io(&path, "lock the store"))?;
+        match Journal::read(store)? {
+            Some(journal) => journal.apply(store)?,
+            None => clear(store)?,
+        }
+        Ok(Change { store: store.to_owned(), journal: Journal::default(), _lock: lock })
+    }
+
+    /// Writes a golden, to be moved to `to`, `SCENE/FILE` in the store.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn put(&mut self, to: &Path, layers: &Layers) -> Result<(), DiskError> {
+        let name = format!("{}.exr", self.journal.moves.len());
+        layers.write(&staged(&self.store).join(&name))?;
+        self.journal.moves.push((name, to.to_owned()));
+        Ok(())
+    }
+
+    /// Removes a golden, `SCENE/FILE` in the store.
+    pub fn remove(&mut self, file: &Path) {
+        self.journal.removals.push(file.to_owned());
+    }
+
+    /// Makes the change.
+    ///
+    /// # Errors
+    /// Where the journal cannot be written: then nothing is changed; or a file not
+    /// moved: then the next change goes on where this one stopped.
+    pub fn commit(self) -> Result<(), DiskError> {
+        self.decide()?;
+        self.journal.apply(&self.store)
+    }
+
+    fn decide(&self) -> Result<(), DiskError> {
+        let path = journal_path(&self.store);
+        if !self.journal.moves.is_empty() {
+            sync(&staged(&self.store))?;
+        }
+        let text = serde_json::json!(self.journal).to_string();
+        write_whole(&path, |b| b.write_all(text.as_bytes()))?;
+        sync(&self.store.join(FOLDER))
+    }
+}
+
+/// Locks for this process alone.
+fn wait(lock: &File, waiting: &dyn Fn()) -> io::Result<()> {
+    let began = Instant::now();
+    loop {
+        match lock.try_lock() {
+            Ok(()) => return Ok(()),
+            Err(TryLockError::WouldBlock) if began.elapsed() < PATIENCE => std::thread::sleep(STEP),
+            Err(TryLockError::WouldBlock) => {
+                waiting();
+                return lock.lock();
+            }
+            Err(TryLockError::Error(e)) => return Err(e),
+        }
+    }
+}
+
+/// Removes what was staged.
+fn clear(store: &Path) -> Result<(), DiskError> {
+    let folder = staged(store);
+    match fs::remove_dir_all(&folder) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(()),
+        removed => removed.map_err(DiskError::io(&folder, "remove what was staged")),
+    }
+}
+
+/// Makes names in a folder last through a power cut, where the system can.
+fn sync(folder: &Path) -> Result<(), DiskError> {
+    if cfg!(unix) {
+        File::open(folder).and_then(|f| f.sync_all()).map_err(DiskError::io(folder, "sync the folder"))?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Store;
+    use super::*;
+
+    fn layers(value: f32) -> Layers {
+        Layers::new([1, 1]).with("mean", vec![value])
+    }
+
+    fn seen(store: &Store) -> Vec<(String, f32)> {
+        store
+            .reading(|s| {
+                let read = |path: &PathBuf| Layers::read(path).unwrap().layers["mean"][0];
+                s.files.iter().map(|(slot, path)| (slot.path().display().to_string(), read(path))).collect()
+            })
+            .unwrap()
+    }
+
+    fn two(store: &Store, value: f32) -> Change {
+        let mut change = store.change(&|| ()).unwrap();
+        for name in ["a.4.exr", "b.4.exr", "c.4.exr"] {
+            change.put(&Path::new("s").join(name), &layers(value)).unwrap();
+        }
+        change
+    }
+
+    /// Every state that a kill can leave, one by one: before the decision readers see
+    /// the old store, after it the new one, and the next change makes it so.
+    #[test]
+    fn a_change_cut_short_anywhere_is_the_old_store_or_the_new_one() {
+        let names = |value: f32| ["s/a.4.exr", "s/b.4.exr", "s/c.4.exr"].map(|n| (n.to_owned(), value)).to_vec();
+        for decided in [false, true] {
+            for moved in 0..=3 {
+                let dir = tempfile::tempdir().unwrap();
+                let store = Store::new(dir.path());
+                two(&store, 1.0).commit().unwrap();
+                assert_eq!(seen(&store), names(1.0));
+                let mut change = two(&store, 2.0);
+                change.remove(Path::new("s/c.4.exr"));
+                change.journal.moves.pop();
+                if decided {
+                    change.decide().unwrap();
+                    let staged = staged(dir.path());
+                    for (from, to) in &change.journal.moves[..moved.min(2)] {
+                        fs::rename(staged.join(from), dir.path().join(to)).unwrap();
+                    }
+                    if moved == 3 {
+                        fs::remove_file(dir.path().join("s/c.4.exr")).unwrap();
+                    }
+                }
+                drop(change);
+                let expected = if decided { names(2.0)[..2].to_vec() } else { names(1.0) };
+                assert_eq!(seen(&store), expected, "decided {decided}, moved {moved}");
+                assert_eq!(store.reading(|s| s.interrupted).unwrap(), decided);
+                drop(store.change(&|| ()).unwrap());
+                assert_eq!(seen(&store), expected, "finished");
+                assert!(!journal_path(dir.path()).exists() && !staged(dir.path()).exists());
+            }
+        }
+    }
+
+    #[test]
+    fn a_journal_leads_nowhere_else() {
+        let dir = tempfile::tempdir().unwrap();
+        let store = Store::new(&dir.path().join("store"));
+        two(&store, 1.0).commit().unwrap();
+        for journal in [
+            r#"{"moves":[["../../x.exr","s/a.4.exr"]],"removals":[]}"#,
+            r#"{"moves":[["0.exr","../a.4.exr"]],"removals":[]}"#,
+            r#"{"moves":[["0.exr","/etc/a.4.exr"]],"removals":[]}"#,
+            r#"{"moves":[],"removals":["../victim"]}"#,
+            r#"{"moves":[],"removals":[".approval/lock"]}"#,
+            "no journal",
+        ] {
+            fs::write(dir.path().join("victim"), "alive").unwrap();
+            fs::write(journal_path(store.folder()), journal).unwrap();
+            assert!(store.reading(|_| ()).unwrap_err().to_string().contains("journal"), "{journal}");
+            assert!(store.change(&|| ()).is_err(), "{journal}");
+            assert!(dir.path().join("victim").exists());
+        }
+    }
+
+    #[test]
+    fn a_second_change_waits_and_says_so_after_a_second() {
+        let dir = tempfile::tempdir().unwrap();
+        let store = Store::new(dir.path());
+        let first = two(&store, 1.0);
+        let said = std::sync::atomic::AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            let second = scope.spawn(|| {
+                let waiting = || said.store(true, std::sync::atomic::Ordering::SeqCst);
+                let change = store.change(&waiting).unwrap();
+                drop(change);
+                Instant::now()
+            });
+            std::thread::sleep(PATIENCE + Duration::from_millis(300));
+            assert!(said.load(std::sync::atomic::Ordering::SeqCst));
+            let let_go = Instant::now();
+            first.commit().unwrap();
+            assert!(second.join().unwrap() >= let_go);
+        });
+        assert_eq!(seen(&store).len(), 3);
+    }
+}

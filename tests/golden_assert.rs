@@ -1,0 +1,46 @@
+//! Golden assertions in somebody's tests, under every environment they may meet.
+
+#![allow(missing_docs, clippy::unwrap_used)]
+
+use std::process::Command;
+
+/// Not a test of its own: an assertion in somebody's test, run by the one below.
+#[test]
+#[ignore = "run by `assertions_obey_the_environment`"]
+fn somebodys_assertion() {
+    let red = std::env::var("RED").unwrap().parse().unwrap();
+    let image = aogauge::golden::RgbImage::from_pixel(8, 8, [red, 0, 0].into());
+    aogauge::golden::assert_golden("somebodys", image, aogauge::golden::Tolerance::Exact);
+}
+
+#[test]
+fn assertions_obey_the_environment() {
+    let dir = tempfile::tempdir().unwrap();
+    let (goldens, failures) = (dir.path().join("goldens"), dir.path().join("failures"));
+    let assertion = |red: &str, more: &[(&str, &str)]| {
+        let mut command = Command::new(std::env::current_exe().unwrap());
+        command.args(["--ignored", "--exact", "somebodys_assertion", "--nocapture"]);
+        for name in ["CI", "GITHUB_ACTIONS", "GITLAB_CI", "JENKINS_URL", "TEAMCITY_VERSION", "TF_BUILD", "BUILDKITE"] {
+            command.env_remove(name);
+        }
+        command.env("RED", red).env("AOGAUGE_GOLDENS", &goldens).env("AOGAUGE_FAILURES", &failures);
+        let output = command.envs(more.iter().copied()).output().unwrap();
+        (output.status.success(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let bless = ("AOGAUGE_BLESS", "1");
+    for (more, says) in [
+        (&[][..], "run the test with AOGAUGE_BLESS=1 and commit"),
+        (&[("AOGAUGE_BLESS", "0")], "run the test with AOGAUGE_BLESS=1 and commit"),
+        (&[bless, ("CI", "true")], "AOGAUGE_BLESS is set, but so is CI"),
+        (&[bless, ("GITLAB_CI", "1")], "so is GITLAB_CI"),
+    ] {
+        let (passed, stderr) = assertion("9", more);
+        assert!(!passed && stderr.contains(says) && stderr.contains("tests/golden_assert.rs"), "{more:?}: {stderr}");
+        assert!(!goldens.exists(), "{more:?}");
+    }
+    assert!(assertion("9", &[bless, ("CI", "false")]).0);
+    assert!(assertion("9", &[("CI", "true")]).0);
+    let (passed, stderr) = assertion("10", &[]);
+    assert!(!passed && stderr.contains("64 of 64 pixels differ"), "{stderr}");
+    assert!(failures.join("somebodys.difference.png").exists());
+}
