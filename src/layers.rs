@@ -89,12 +89,11 @@ impl Layers {
         }
         let broken = |e: exr::error::Error| DiskError::content(path, format!("not a readable OpenEXR image: {e}"));
         let meta = MetaData::read_from_buffered(io::Cursor::new(&bytes), false).map_err(broken)?;
-        let claimed: u64 = meta
-            .headers
-            .iter()
-            .map(|h| h.layer_size.area() as u64 * h.channels.bytes_per_pixel as u64)
-            .fold(0, u64::saturating_add);
-        if claimed > (bytes.len() as u64).saturating_mul(MAX_RATIO) {
+        // In 128 bits: sides and channels come from the file.
+        let bytes_of = |[width, height, pixel]: [usize; 3]| width as u128 * height as u128 * pixel as u128;
+        let claimed: u128 =
+            meta.headers.iter().map(|h| bytes_of([h.layer_size.0, h.layer_size.1, h.channels.bytes_per_pixel])).sum();
+        if claimed > bytes.len() as u128 * u128::from(MAX_RATIO) {
             return Err(DiskError::content(
                 path,
                 format!(
@@ -216,6 +215,20 @@ mod tests {
         fs::write(&path, "version https://git-lfs.github.com/spec/v1\n").unwrap();
         assert!(Layers::read(&path).unwrap_err().to_string().contains("LFS"));
         assert!(Layers::read(&folder.path().join("none.exr")).unwrap_err().to_string().contains("none.exr"));
+    }
+
+    /// Images that lie, as whoever compares may meet them: the claim of one wraps to
+    /// nothing in 64 bits.
+    #[test]
+    fn hostile_images_are_errors_here_too() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bad-images");
+        let images = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
+        let mut tried = 0;
+        for path in images.filter(|p| p.extension().is_some_and(|e| e == "exr")) {
+            assert!(Layers::read(&path).is_err(), "{}", path.display());
+            tried += 1;
+        }
+        assert!(tried > 8);
     }
 
     /// Every byte of the header, one by one, set to its extremes: an error or an
