@@ -617,7 +617,7 @@ def timed(program):
             print(f"{name:40} {wall:6.2f} s, of the processors {cpu:6.2f} s")
         r, t = (flip_evaluator.load(path) for path in paths)
         mean = flip_evaluator.evaluate(r, t, "LDR", True, False, False, {"ppd": PPD})[0].astype(np.float64).mean()
-        scores = json.loads(run([*ours, "--format", "json"])[2])["scores"]
+        scores = json.loads(run([*ours, "--format", "json"])[2])["pairs"][0]["scores"]["scores"]
         found = next(s["value"] for s in scores if s["name"] == "flip")
         # Its tool prints a running sum in f32, which is no mean at this size.
         print(f"mean FLIP: aogauge {found:.7f}, flip-evaluator's map {mean:.7f}")
