@@ -7,7 +7,12 @@ use exr::prelude::{
     Text, Vec2, WritableImage, attribute::AttributeValue,
 };
 use sha2::{Digest, Sha256};
-use std::{collections::BTreeMap, fs, io, path::Path};
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    io::{self, Read},
+    path::Path,
+};
 
 /// Named layers of one resolution, with text attributes.
 ///
@@ -30,6 +35,10 @@ const ATTRIBUTE: &str = "aogauge";
 
 /// More bytes of pixels than this for a byte of file is no honest compression.
 const MAX_RATIO: u64 = 2000;
+
+/// What a file and what decoding it may take, bytes: two 16-bit RGB images of
+/// 16,384 pixels a side.
+pub(crate) const MAX_BYTES: u64 = 3 << 30;
 
 impl Layers {
     /// No layers yet.
@@ -83,12 +92,16 @@ impl Layers {
     /// Where the file is missing, truncated, no OpenEXR, or claims more pixels
     /// than its size can hold.
     pub fn read(path: &Path) -> Result<Self, DiskError> {
-        let bytes = fs::read(path).map_err(DiskError::io(path, "read the image"))?;
-        if bytes.starts_with(b"version https://git-lfs") {
-            return Err(DiskError::content(path, "this is a Git LFS pointer, not the image: run `git lfs pull`"));
-        }
+        Self::decode(path, &load(path)?)
+    }
+
+    /// The same from a file's bytes; errors name `path`.
+    ///
+    /// # Errors
+    /// As [`Layers::read`].
+    pub fn decode(path: &Path, bytes: &[u8]) -> Result<Self, DiskError> {
         let broken = |e: exr::error::Error| DiskError::content(path, format!("not a readable OpenEXR image: {e}"));
-        let meta = MetaData::read_from_buffered(io::Cursor::new(&bytes), false).map_err(broken)?;
+        let meta = MetaData::read_from_buffered(io::Cursor::new(bytes), false).map_err(broken)?;
         // In 128 bits: sides and channels come from the file.
         let bytes_of = |[width, height, pixel]: [usize; 3]| width as u128 * height as u128 * pixel as u128;
         let claimed: u128 =
@@ -109,7 +122,7 @@ impl Layers {
             .first_valid_layer()
             .all_attributes()
             .non_parallel()
-            .from_buffered(io::Cursor::new(&bytes))
+            .from_buffered(io::Cursor::new(bytes))
             .map_err(broken)?;
         let layer = image.layer_data;
         let mut layers = Layers::new([layer.size.0 as u32, layer.size.1 as u32]);
@@ -126,6 +139,29 @@ impl Layers {
         }
         Ok(layers)
     }
+}
+
+/// The bytes of an image file.
+///
+/// # Errors
+/// Where it cannot be read, is a Git LFS pointer or has more than 3 GiB.
+pub fn load(path: &Path) -> Result<Vec<u8>, DiskError> {
+    let file = File::open(path).map_err(DiskError::io(path, "read the image"))?;
+    let mut bytes = Vec::new();
+    if let Ok(length) = file.metadata().map(|m| m.len()) {
+        bytes.reserve(length.min(MAX_BYTES) as usize + 1);
+    }
+    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(DiskError::io(path, "read the image"))?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(DiskError::content(
+            path,
+            format!("more than {MAX_BYTES} bytes, which is the most an image may have"),
+        ));
+    }
+    if bytes.starts_with(b"version https://git-lfs") {
+        return Err(DiskError::content(path, "this is a Git LFS pointer, not the image: run `git lfs pull`"));
+    }
+    Ok(bytes)
 }
 
 /// A JSON object in ASCII: everything else as `\u` escapes.
@@ -181,6 +217,7 @@ pub fn write_png(path: &Path, picture: &image::RgbImage) -> Result<(), DiskError
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     fn sample() -> Layers {
         let mut layers = Layers::new([3, 2])

@@ -5,7 +5,7 @@ use super::{
     sampled::{Sampled, WelchReport},
 };
 use crate::{
-    layers::Layers,
+    layers::{Layers, load},
     metrics::image::{Encoding, Image, ImageError, Pair, scores},
     picture::read::{self, Found, LayerChoice},
     stats::pixel_p_values,
@@ -31,7 +31,7 @@ type Keep<'a> = dyn FnMut(&PairReport, &Drawn<'_>) -> Result<(), CompareError> +
 impl Files<'_> {
     /// One report, or one a layer.
     pub(super) fn compare(&self, settings: &Settings, keep: &mut Keep<'_>) -> Result<Vec<PairReport>, CompareError> {
-        let (reference, test) = rayon::join(|| read::load(self.reference), || read::load(self.test));
+        let (reference, test) = rayon::join(|| load(self.reference), || load(self.test));
         let (reference, test) = (reference?, test?);
         let mask = self.mask(settings.mask.as_ref())?;
         if settings.mode == Mode::Exact {
@@ -165,9 +165,9 @@ impl Files<'_> {
         let (scores, maps) = scores(&pair, &settings.options)?;
         let size = scores.size.map(|n| n as u32);
         let welch = sampled.map(|sampled| WelchReport::of(size, sampled));
-        let p = sampled.map(|[reference, test]| pixel_p_values(size, &test.sample(), &reference.sample()));
+        let p = sampled.map(|[reference, test]| move || pixel_p_values(size, &test.sample(), &reference.sample()));
         let report = PairReport::judged(self.name, layer, exact, Some(scores), welch, &settings.limits);
-        keep(&report, &Drawn { reference, test, maps: &maps, p: p.as_deref() })?;
+        keep(&report, &Drawn { reference, test, maps: &maps, p: p.as_ref().map(|p| p as &dyn Fn() -> Vec<f64>) })?;
         Ok(report)
     }
 
@@ -213,7 +213,7 @@ impl Files<'_> {
             if read::layer_names(path, bytes)?.iter().filter(|n| is_replicate(n)).count() < 2 {
                 return Ok(None);
             }
-            let Layers { layers, attributes, .. } = Layers::read(path)?;
+            let Layers { layers, attributes, .. } = Layers::decode(path, bytes)?;
             let images = layers.into_iter().filter(|(name, _)| is_replicate(name)).map(|(_, values)| values).collect();
             Ok(Some(Sampled::new(images, attributes.get("rays").and_then(|r| r.parse().ok()))))
         };

@@ -15,7 +15,7 @@ use image::{Rgb, RgbImage};
 use std::path::Path;
 
 /// Two images as they were compared, and the maps of their difference.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Drawn<'a> {
     /// What is compared with.
     pub reference: &'a Image,
@@ -23,8 +23,9 @@ pub struct Drawn<'a> {
     pub test: &'a Image,
     /// The maps.
     pub maps: &'a Maps,
-    /// p-values of Welch's test of each pixel, where there are replicates.
-    pub p: Option<&'a [f64]>,
+    /// Makes the p-values of Welch's test of each pixel, where there are replicates: a
+    /// tail of Student's t a pixel, for those who draw them.
+    pub p: Option<&'a dyn Fn() -> Vec<f64>>,
 }
 
 fn size(image: &Image) -> [u32; 2] {
@@ -53,7 +54,7 @@ pub fn write_maps(folder: &Path, drawn: &Drawn<'_>, scale: f64) -> Result<(), Co
         }
     }
     if let Some(p) = drawn.p {
-        all.push(("p-value", "Welch's test of each pixel alone, p", ErrorMap::p_values(size, p, ALPHA)?));
+        all.push(("p-value", "Welch's test of each pixel alone, p", ErrorMap::p_values(size, &p(), ALPHA)?));
     }
     for (name, title, map) in &all {
         write_png(&folder.join(format!("{name}.png")), &map.picture(&Caption { title, unit: "" }))?;

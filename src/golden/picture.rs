@@ -3,11 +3,11 @@
 use super::{Comparison, Limits, Sampled, Terms, TileMeans, compare, sampled::layer};
 use crate::{
     disk::DiskError,
-    layers::{Layers, pixel_hash, write_png},
+    layers::{Layers, load, pixel_hash, write_png},
     metrics::image::{DEFAULT_PPD, Encoding, Image, Pair, flip, signed_map},
     picture::{
         error_map::{Caption, ErrorMap},
-        read::{Values, decode_samples, load, read},
+        read::{Values, decode_samples, read},
         scale::Scale,
     },
 };

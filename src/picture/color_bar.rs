@@ -179,20 +179,11 @@ fn legend(picture: &mut RgbImage, scale: &Scale, [left, top]: [u32; 2], room: f3
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn scales() -> [Scale; 5] {
-        [
-            Scale::absolute(0.5).unwrap(),
-            Scale::signed(0.5).unwrap(),
-            Scale::flip(),
-            Scale::p_value(0.01).unwrap(),
-            Scale::similarity(0.0).unwrap(),
-        ]
-    }
+    use crate::picture::scale::tests::all;
 
     #[test]
     fn no_scale_has_the_colours_of_pixels_without_a_value() {
-        for scale in scales() {
+        for scale in all() {
             for i in 0..=2550 {
                 let color = scale.color_at(f64::from(i) / 2550.0);
                 for grey in CHECKER {
@@ -209,7 +200,7 @@ mod tests {
     /// number as it is written by itself.
     #[test]
     fn numbers_stand_under_their_ticks() {
-        for scale in scales() {
+        for scale in all() {
             let picture = color_bar(&scale, "", 600);
             let size = lettering_size(600);
             let margin = size.ceil() as u32;
@@ -241,7 +232,7 @@ mod tests {
 
     #[test]
     fn a_bar_begins_and_ends_with_the_colours_of_its_ends_and_arrows_where_it_is_open() {
-        for scale in scales() {
+        for scale in all() {
             let picture = color_bar(&scale, "openness", 500);
             let size = lettering_size(500);
             let margin = size.ceil() as u32;

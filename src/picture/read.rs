@@ -4,20 +4,14 @@
 use super::read_exr::{self, exr_size};
 use crate::{
     disk::DiskError,
+    layers::{MAX_BYTES, load},
     metrics::image::{Encoding, Image},
 };
 use image::{DynamicImage, ImageReader, Limits};
-use std::{
-    fs::File,
-    io::{Cursor, Read},
-    path::Path,
-};
+use std::{io::Cursor, path::Path};
 
 /// An image may be this wide and high, pixels.
 pub(super) const MAX_SIDE: u32 = 65_536;
-/// What a file and what decoding it may take, bytes: two 16-bit RGB images of
-/// 16,384 pixels a side.
-const MAX_BYTES: u64 = 3 << 30;
 /// What any file may decode to, bytes, however small it is.
 const MIN_BYTES: u64 = 4 << 20;
 /// More bytes of pixels than this for a byte of file is no honest compression:
@@ -91,29 +85,6 @@ pub fn read(path: &Path, layer: Option<&str>, encoding: Option<Encoding>) -> Res
     let choice = layer.map_or(LayerChoice::Main, LayerChoice::Named);
     let mut found = decode(path, &load(path)?, choice, encoding)?;
     found.pop().ok_or_else(|| DiskError::content(path, "the image has no layer"))
-}
-
-/// The bytes of an image file.
-///
-/// # Errors
-/// Where it cannot be read, is a Git LFS pointer or has more than 3 GiB.
-pub fn load(path: &Path) -> Result<Vec<u8>, DiskError> {
-    let file = File::open(path).map_err(DiskError::io(path, "read the image"))?;
-    let mut bytes = Vec::new();
-    if let Ok(length) = file.metadata().map(|m| m.len()) {
-        bytes.reserve(length.min(MAX_BYTES) as usize + 1);
-    }
-    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(DiskError::io(path, "read the image"))?;
-    if bytes.len() as u64 > MAX_BYTES {
-        return Err(DiskError::content(
-            path,
-            format!("more than {MAX_BYTES} bytes, which is the most an image may have"),
-        ));
-    }
-    if bytes.starts_with(b"version https://git-lfs") {
-        return Err(DiskError::content(path, "this is a Git LFS pointer, not the image: run `git lfs pull`"));
-    }
-    Ok(bytes)
 }
 
 /// Decodes the bytes of an image; `path` has the extension, and errors name it. One

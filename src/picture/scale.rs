@@ -237,10 +237,11 @@ pub fn number(value: f64) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn all() -> [Scale; 5] {
+    /// One scale of each kind.
+    pub fn all() -> [Scale; 5] {
         [
             Scale::absolute(0.5).unwrap(),
             Scale::signed(0.5).unwrap(),

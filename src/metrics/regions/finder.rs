@@ -63,19 +63,10 @@ impl<'a> Finder<'a> {
 
     /// The regions of what a view sees, the sheet being all occluders together.
     pub fn regions(&self, gbuffer: &GBuffer) -> Regions {
-        let found: Vec<[bool; 5]> = gbuffer
-            .surfaces
-            .par_iter()
-            .map(|surface| {
-                let mut member = [false; 5];
-                if let Some(s) = surface {
-                    self.beside(&self.sheet, s, &mut member);
-                    member[Region::All as usize] = true;
-                    member[Region::Far as usize] = self.is_far(s);
-                }
-                member
-            })
-            .collect();
+        let found = self.members_beside(&self.sheet, gbuffer, |s, member| {
+            member[Region::All as usize] = true;
+            member[Region::Far as usize] = self.is_far(s);
+        });
         Regions { pixels: std::array::from_fn(|region| members(&found, region)) }
     }
 
@@ -108,22 +99,31 @@ impl<'a> Finder<'a> {
     }
 
     fn of_sheet(&self, sheet: &Tracer, gbuffer: &GBuffer, regions: &Regions) -> Regions {
-        let found: Vec<[bool; 5]> = gbuffer
-            .surfaces
-            .par_iter()
-            .map(|surface| {
-                let mut member = [false; 5];
-                if let Some(s) = surface {
-                    self.beside(sheet, s, &mut member);
-                }
-                member
-            })
-            .collect();
+        let found = self.members_beside(sheet, gbuffer, |_, _| {});
         let mut own = regions.clone();
         for region in SIDES {
             own.pixels[region as usize] = members(&found, region as usize);
         }
         own
+    }
+
+    /// Membership of each pixel, row by row: what lies under a sheet or beside it, and
+    /// what `more` adds.
+    fn members_beside(
+        &self,
+        sheet: &Tracer,
+        gbuffer: &GBuffer,
+        more: impl Fn(&Surface, &mut [bool; 5]) + Sync,
+    ) -> Vec<[bool; 5]> {
+        let of = |surface: &Option<Surface>| {
+            let mut member = [false; 5];
+            if let Some(s) = surface {
+                self.beside(sheet, s, &mut member);
+                more(s, &mut member);
+            }
+            member
+        };
+        gbuffer.surfaces.par_iter().map(of).collect()
     }
 
     fn radius(&self) -> f32 {
