@@ -205,17 +205,28 @@ fn images_without_noise_have_tolerances() {
     assert!(!goldens.join("scene").exists());
     assert!(approve(&still, 2, "psnr=3").contains("flip-max="));
     approve(&still, 0, "flip=0.05,flip-max=1,ssim=0.5");
-    edited(&still, |record| record["seed"] = json!(5));
     mean(&image, |i, v| if i == 777 { 1.0 - v } else { v });
     let verify =
         |code: i32| expect(code, &["golden", "verify", text(&still), "--goldens", text(&goldens), "--only", "classic"]);
     assert!(verify(0).contains("alike      no noise; flip "));
     approve(&still, 0, "max=1");
-    edited(&still, |record| record["seed"] = json!(6));
     mean(&image, |i, v| if i == 777 { 1.0 - v } else { v });
     let stderr = verify(1);
     assert!(stderr.contains("flip-max") && stderr.contains("at 9, 12, at most 0.1 is allowed"), "{stderr}");
     assert!(stdout(&["golden", "list", "--goldens", text(&goldens)]).contains("tolerance flip=0.002"));
+}
+
+#[test]
+fn with_the_golden_s_own_seed_one_wrong_pixel_is_found() {
+    let dir = tempfile::tempdir().unwrap();
+    let (goldens, wrong) = (dir.path().join("goldens"), dir.path().join("wrong"));
+    expect(0, &["golden", "approve", text(&RUNS.out[0]), "--goldens", text(&goldens), "--reason", "r"]);
+    copied(&RUNS.out[0], &wrong);
+    let place = 64 * 5 + 9;
+    mean(&wrong.join("images/scene/classic.cpu.4.exr"), |i, v| if i == place { 1.0 - v } else { v });
+    let stderr = expect(1, &["golden", "verify", text(&wrong), "--goldens", text(&goldens), "--only", "classic"]);
+    assert!(stderr.contains("same seeds; rays: ") && stderr.contains("of the pixel 9,5 or more"), "{stderr}");
+    assert!(stderr.contains("1 pixels differ, in 9,5 (1x1)"), "{stderr}");
 }
 
 fn pointer(path: &Path) {

@@ -1,6 +1,6 @@
 //! Whether an image may stand for its golden, and what moved where it may not.
 
-use super::{Limits, Measured, Sampled};
+use super::{Limits, Measured, Sampled, rays};
 use crate::{
     layers::pixel_hash,
     metrics::image::{Encoding, Image, ImageError, Pair},
@@ -16,10 +16,6 @@ use std::collections::BTreeMap;
 /// A tile's bias that must be found with probability .8, or a comparison says
 /// nothing.
 pub const MUST_SEE: f64 = 0.05;
-
-/// Rays that may be decided differently where the random numbers are the same: a
-/// share of all. It is what the GPU is allowed against the CPU.
-const SAME_RAYS: f64 = 1e-4;
 
 /// Rejections that a comparison names; the rest are counted.
 const NAMED: usize = 64;
@@ -64,8 +60,14 @@ pub enum Moved {
     /// The random numbers are the golden's, but more rays than rounding can explain
     /// are decided differently.
     Rays {
-        /// Their share, at least.
+        /// Where they are too many: in the whole image, in a tile, in a pixel.
+        scale: Scale,
+        /// Their share of the rays of the worst such place, at least.
         share: f64,
+        /// The share that rounding may move there.
+        limit: f64,
+        /// The worst place: left, top, width and height.
+        worst: [u32; 4],
         /// Pixels whose means differ.
         pixels: usize,
         /// The least rectangle that holds them: left, top, width and height.
@@ -199,10 +201,11 @@ impl Comparison {
 /// In this order:
 /// 1. The hash of the decoded means: the same bits are the same image.
 /// 2. Pixels that hold a number on one side only.
-/// 3. With the golden's own seeds no more than 1 ray in 10,000 may be decided
-///    differently. Where more are, the tests of samples tell what moved: the images
-///    share their noise, so what rejects is surer than it says.
-/// 4. Images without noise on both sides are held against perceptual limits.
+/// 3. Images without noise on both sides are held against perceptual limits.
+/// 4. With the golden's own seeds no more than 1 ray in 10,000 may be decided
+///    differently, and in a tile or pixel no more than chance lets gather there at that
+///    rate. Where more are, the tests of samples tell what moved: the images share
+///    their noise, so what rejects is surer than it says.
 /// 5. Samples: [`three_scales`], noise against noise, and whether noise explains how
 ///    pixels differ. Each of these five kinds of test has a fifth of the family error.
 pub fn compare(golden: &Sampled, image: &Sampled, terms: &Terms<'_>) -> Comparison {
@@ -212,8 +215,8 @@ pub fn compare(golden: &Sampled, image: &Sampled, terms: &Terms<'_>) -> Comparis
     let sided = one_sided(golden, image);
     let still = golden.is_deterministic() && image.is_deterministic() || golden.replicates.min(image.replicates) < 2;
     let method = match (same_seeds(golden, image), still, &golden.tiles, &image.tiles) {
-        (true, ..) => Method::SameSeeds,
         (_, true, ..) => Method::Limits,
+        (true, ..) => Method::SameSeeds,
         (_, _, Some(_), Some(_)) => Method::Replicates,
         _ => Method::Pixels,
     };
@@ -224,13 +227,9 @@ pub fn compare(golden: &Sampled, image: &Sampled, terms: &Terms<'_>) -> Comparis
     }
     match method {
         Method::SameSeeds => {
-            let share = rays_moved(golden, image);
-            if share.is_nan() || share > SAME_RAYS {
-                let (pixels, place) = differing(golden, image);
-                found.moved.push(Moved::Rays { share, pixels, place });
-                if !still {
-                    by_tests(golden, image, terms, &mut found);
-                }
+            if let Some(moved) = rays::moved(golden, image, terms) {
+                found.moved.push(moved);
+                by_tests(golden, image, terms, &mut found);
             }
         }
         Method::Limits => by_limits(golden, image, terms, &mut found),
@@ -368,27 +367,4 @@ fn moments(golden: &Sampled, image: &Sampled) -> [f64; 2] {
         sums = [sums[0] + d, sums[1] + d * d];
     }
     sums.map(|s| s / n.max(1) as f64)
-}
-
-/// The least share of rays that explains the difference of the means.
-fn rays_moved(golden: &Sampled, image: &Sampled) -> f64 {
-    let pairs = || golden.mean.iter().zip(&image.mean).filter(|(a, b)| a.is_finite() && b.is_finite());
-    let moved: f64 = pairs().map(|(a, b)| f64::from((a - b).abs())).sum();
-    moved / pairs().count() as f64
-}
-
-/// How many means differ, and the least rectangle that holds them.
-fn differing(golden: &Sampled, image: &Sampled) -> (usize, [u32; 4]) {
-    let width = golden.resolution[0].max(1);
-    let (mut pixels, mut low, mut high) = (0, [u32::MAX; 2], [0; 2]);
-    for (i, (a, b)) in golden.mean.iter().zip(&image.mean).enumerate() {
-        if a != b && a.is_finite() && b.is_finite() {
-            pixels += 1;
-            let at = [i as u32 % width, i as u32 / width];
-            low = [low[0].min(at[0]), low[1].min(at[1])];
-            high = [high[0].max(at[0]), high[1].max(at[1])];
-        }
-    }
-    let side = |k: usize| high[k] + 1 - low[k];
-    (pixels, if pixels > 0 { [low[0], low[1], side(0), side(1)] } else { [0; 4] })
 }

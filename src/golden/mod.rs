@@ -17,6 +17,7 @@ mod compare;
 mod file;
 mod limits;
 mod picture;
+mod rays;
 mod sampled;
 mod stale;
 mod store;

@@ -4,7 +4,7 @@ use super::{
     Comparison, Method, Moved,
     compare::{MUST_SEE, RegionShift},
 };
-use crate::stats::Difference;
+use crate::stats::{Difference, Scale};
 
 impl Comparison {
     /// One line for people.
@@ -41,11 +41,20 @@ impl Comparison {
             Moved::Structure { pixels, first: [x, y] } => {
                 format!("structure: {pixels} pixels hold a number where the golden has none, the first at {x},{y}")
             }
-            Moved::Rays { share, pixels, place: [x, y, w, h] } => format!(
-                "rays: {:.3} % or more are decided differently, in {pixels} pixels at {x},{y} ({w}x{h}), mean bias {:+.5}",
-                share * 100.0,
-                self.bias
-            ),
+            Moved::Rays { scale, share, limit, worst: [left, top, ..], pixels, place: [x, y, w, h] } => {
+                let of = match scale {
+                    Scale::Image => "of all".to_owned(),
+                    Scale::Tile => format!("of the tile at {left},{top}"),
+                    Scale::Pixel => format!("of the pixel {left},{top}"),
+                };
+                format!(
+                    "rays: {:.3} % {of} or more are decided differently, rounding may move {:.3} %; \
+                     {pixels} pixels differ, in {x},{y} ({w}x{h}); mean bias {:+.5}",
+                    share * 100.0,
+                    limit * 100.0,
+                    self.bias
+                )
+            }
             Moved::Shift { places, rejected, regions } => {
                 let brighter = places.first().map_or(self.bias, |d| d.bias) > 0.0;
                 let kind = if brighter { "brighter" } else { "darker" };
