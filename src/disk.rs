@@ -55,7 +55,7 @@ pub fn write_whole(
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     fs::create_dir_all(folder).map_err(DiskError::io(folder, "create the folder"))?;
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".aogauge-").suffix(".part");
+    builder.prefix(PART[0]).suffix(PART[1]);
     // The temporary file's own mode is private; a record is meant to be shared.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644));
@@ -66,6 +66,14 @@ pub fn write_whole(
     file.as_file().sync_all().map_err(DiskError::io(path, "write the file"))?;
     file.persist(path).map_err(|e| DiskError::io(path, "rename the finished file")(e.error))?;
     Ok(())
+}
+
+/// How the temporary names of [`write_whole`] begin and end.
+const PART: [&str; 2] = [".aogauge-", ".part"];
+
+/// Whether a file is one that [`write_whole`] was writing when it was killed.
+pub fn is_part(name: &str) -> bool {
+    name.starts_with(PART[0]) && name.ends_with(PART[1])
 }
 
 /// Reads a text file.

@@ -52,18 +52,7 @@ impl JudgeCache {
     /// `~/.cache/aogauge/judge` on Linux). None where there is no such folder, or
     /// the program cannot read itself.
     pub fn of_user() -> Option<Self> {
-        let mut program = BufReader::new(fs::File::open(std::env::current_exe().ok()?).ok()?);
-        let mut sha = Sha256::new();
-        loop {
-            let chunk = program.fill_buf().ok()?;
-            if chunk.is_empty() {
-                break;
-            }
-            sha.update(chunk);
-            let read = chunk.len();
-            program.consume(read);
-        }
-        Some(Self::new(Self::folder_of_user()?, hex(&sha.finalize())))
+        Some(Self::new(Self::folder_of_user()?, program()?))
     }
 
     /// Where [`Self::of_user`] keeps its files.
@@ -137,6 +126,22 @@ impl JudgeCache {
     pub fn folder(&self) -> &Path {
         &self.folder
     }
+}
+
+/// The hash of this program's own file; None where it cannot be read.
+pub fn program() -> Option<String> {
+    let mut program = BufReader::new(fs::File::open(std::env::current_exe().ok()?).ok()?);
+    let mut sha = Sha256::new();
+    loop {
+        let chunk = program.fill_buf().ok()?;
+        if chunk.is_empty() {
+            break;
+        }
+        sha.update(chunk);
+        let read = chunk.len();
+        program.consume(read);
+    }
+    Some(hex(&sha.finalize()))
 }
 
 /// The files of a cache folder: when each was used last, its bytes, its path.

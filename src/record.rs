@@ -32,7 +32,10 @@ pub const VERSION: u32 = 3;
 /// The file that makes a folder a record.
 pub const FILE: &str = "record.json";
 
-/// Marks a folder that a run has begun to fill.
+/// The file that makes a folder a shard.
+pub const SHARD: &str = "shard.json";
+
+/// The folder that a run works in; marks a record that a run has begun to fill.
 const BEGUN: &str = ".aogauge-run";
 
 /// Everything one run found.
@@ -49,6 +52,12 @@ pub struct Record {
     pub seed: u32,
     /// The machine it ran on.
     pub machine: Machine,
+    /// What the names of cases had to contain, where only some were asked for.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub filter: Option<String>,
+    /// Why the run ended early; absent where it did not.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub incomplete: Option<String>,
     /// What the run came to.
     pub summary: Summary,
     /// Failures first, then in the order of gates and cases.
@@ -391,7 +400,13 @@ impl Record {
     pub fn read(folder: &Path) -> Result<Self, DiskError> {
         let path = folder.join(FILE);
         if !path.exists() {
-            let why = if folder.join(BEGUN).exists() { "the run that wrote it did not finish" } else { "not a record" };
+            let why = if folder.join(SHARD).exists() {
+                "it is a shard: merge it with the others first"
+            } else if folder.join(BEGUN).exists() {
+                "the run that wrote it did not finish"
+            } else {
+                "not a record"
+            };
             return Err(DiskError::content(folder, format!("there is no {FILE} here: {why}")));
         }
         let text = read_text(&path)?;

@@ -10,7 +10,7 @@ use aogauge::{
     record::{Machine, Record, RecordFolder},
     render::{Geometry, cpu::Cpu, gbuffer::GBuffer},
     report,
-    run::{Observer, Prepared},
+    run::{Means, Observer, Prepared},
     scenes::{Scene, library},
     suite::{Plan, Platform, Suite},
 };
@@ -20,7 +20,7 @@ use std::fs;
 struct Silent;
 
 impl Observer for Silent {
-    fn step(&self, _: usize, _: usize, _: &str) {}
+    fn step(&self, _: u64, _: u64, _: &str) {}
 }
 
 /// A glTF of a floor and two sheets across it, 5 cm over it, at x = -0.3 and 0.3: the
@@ -104,7 +104,7 @@ fn imported() -> (Record, String) {
     let out = dir.path().join("out");
     let folder = RecordFolder::create(&out).unwrap();
     let machine = Machine::here("a test".into(), None);
-    let record = Prepared::new(&plan).unwrap().run(&Cpu, None, None, machine, &folder, &Silent).unwrap();
+    let record = Prepared::new(&plan).unwrap().run(&Means::new(&Cpu, machine), &folder, &Silent).unwrap();
     assert_eq!(report::write(&out, &out).unwrap(), record);
     let text = fs::read_to_string(out.join("report.md")).unwrap();
     (record, text)

@@ -8,10 +8,13 @@ use aogauge::{
     record::{Machine, Record, RecordFolder},
     render::{Frame, Geometry, Job, Kind, Loaded, RenderError, Renderer, cpu::Cpu},
     report,
-    run::{Observer, Prepared, steps},
+    run::{Means, Observer, Prepared},
     suite::{Plan, Platform, Suite},
 };
-use std::{cell::Cell, path::Path};
+use std::{
+    path::Path,
+    sync::atomic::{AtomicU64, Ordering},
+};
 
 /// The CPU under the GPU's name, failing at 8 rays.
 struct Failing;
@@ -33,18 +36,18 @@ impl Loaded for LoadedFailing<'_> {
     }
 }
 
-/// Counts steps.
+/// Counts what is done.
 #[derive(Default)]
 struct Steps {
-    last: Cell<usize>,
-    total: Cell<usize>,
+    last: AtomicU64,
+    total: AtomicU64,
 }
 
 impl Observer for Steps {
-    fn step(&self, done: usize, total: usize, _what: &str) {
-        assert!(done >= self.last.get() && done < total);
-        self.last.set(done);
-        self.total.set(total);
+    fn step(&self, done: u64, total: u64, _what: &str) {
+        assert!(done < total);
+        self.last.fetch_max(done, Ordering::Relaxed);
+        self.total.store(total, Ordering::Relaxed);
     }
 }
 
@@ -75,8 +78,11 @@ within = 0.01
     let observer = Steps::default();
     let machine = Machine::here("a test".into(), Some(false));
     let prepared = Prepared::new(&plan).unwrap();
-    let record = prepared.run(&Cpu, Some(&Failing), None, machine, &folder, &observer).unwrap();
-    assert_eq!((observer.last.get() + 1, observer.total.get()), (steps(&plan), steps(&plan)));
+    let mut means = Means::new(&Cpu, machine);
+    means.gpu = Some(&Failing);
+    let record = prepared.run(&means, &folder, &observer).unwrap();
+    assert_eq!(observer.total.into_inner(), prepared.cost(None));
+    assert!(observer.last.into_inner() > 0);
     assert_eq!((record.summary.cases, record.summary.failed_cases, record.summary.pass), (4, 1, 1));
     let failed: Vec<_> = record.cases.iter().filter(|c| c.error.is_some()).collect();
     assert_eq!(failed[0].case.id(), "plane/classic/gpu/8");
@@ -137,12 +143,14 @@ kind = "extended"
 receiver_plane = "clipped"
 "#;
 
-fn run(text: &str, cpu: &dyn Renderer, gpu: Option<&dyn Renderer>, out: &Path) -> Record {
+fn run(text: &str, cpu: &(dyn Renderer + Sync), gpu: Option<&(dyn Renderer + Sync)>, out: &Path) -> Record {
     let suite = Suite::from_toml("x", "x.toml", text, Path::new(".")).unwrap();
     let plan = Plan::new(&suite, if gpu.is_some() { Platform::Gpu } else { Platform::Cpu }, None);
     let folder = RecordFolder::create(out).unwrap();
     let machine = Machine::here("a test".into(), gpu.map(|_| false));
-    Prepared::new(&plan).unwrap().run(cpu, gpu, None, machine, &folder, &Steps::default()).unwrap()
+    let mut means = Means::new(cpu, machine);
+    means.gpu = gpu;
+    Prepared::new(&plan).unwrap().run(&means, &folder, &Steps::default()).unwrap()
 }
 
 #[test]

@@ -13,7 +13,7 @@ use aogauge::{
         Estimator, Falloff, Frame, Geometry, Job, RenderError, Renderer, ScreenSpace, cpu::Cpu, gbuffer::GBuffer,
         gpu::Gpu, screen_space::Integral,
     },
-    run::{Observer, Prepared},
+    run::{Means, Observer, Prepared},
     scenes::{Scene, View, library},
     screen_camera::screen_camera,
     suite::{Plan, Platform, Suite},
@@ -232,7 +232,7 @@ fn the_gpu_sees_what_the_cpu_sees() {
 struct Silent;
 
 impl Observer for Silent {
-    fn step(&self, _done: usize, _total: usize, _what: &str) {}
+    fn step(&self, _done: u64, _total: u64, _what: &str) {}
 }
 
 /// Half a centimetre under the hem no camera sees the far flank: metrics that
@@ -275,7 +275,7 @@ kind = "gtao"
     let plan = Plan::new(&suite, Platform::Cpu, None);
     let folder = RecordFolder::create(&dir.path().join("out")).unwrap();
     let machine = Machine::here("a test".into(), None);
-    let record = Prepared::new(&plan).unwrap().run(&Cpu, None, None, machine, &folder, &Silent).unwrap();
+    let record = Prepared::new(&plan).unwrap().run(&Means::new(&Cpu, machine), &folder, &Silent).unwrap();
     let screen = record.scenes[0].screen.as_ref().unwrap();
     let flanks = [Region::Left, Region::Right].map(|r| (screen.regions[&r], record.scenes[0].regions[&r]));
     assert!(flanks.iter().any(|(shown, of)| *shown < 64 && *of == 256), "{flanks:?}");

@@ -97,7 +97,7 @@ fn gpu(args: &GpuArgs) -> Result<Exit, Failure> {
     let bar = bar();
     let each = (rounds.warm_up + rounds.counted) as usize;
     for (i, s) in scenes.iter().enumerate() {
-        let step = |round: u32| bar.step(i * each + round as usize, scenes.len() * each, &s.name);
+        let step = |round: u32| bar.step((i * each + round as usize) as u64, (scenes.len() * each) as u64, &s.name);
         step(0);
         match scene(&gpu, s, &settings, step) {
             Ok(measured) => bench.scenes.push(measured),

@@ -162,7 +162,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     let mut study = args.setting()?.study();
     if args.map {
         let bar = bar();
-        study.map = Some(study.setting.map(&|done, total| bar.step(done, total, "boxes of the map")));
+        study.map = Some(study.setting.map(&|done, total| bar.step(done as u64, total as u64, "boxes of the map")));
     }
     let document = json(&study)?;
     if let Some(out) = &args.out {

@@ -6,6 +6,7 @@ mod composite;
 mod doctor;
 mod flatland;
 mod golden;
+mod merge;
 mod on_gpu;
 mod render;
 mod report;
@@ -54,6 +55,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Verb {
     Run(run::Args),
+    Merge(merge::Args),
     Render(render::Args),
     Compare(compare::Args),
     Composite(composite::Args),
@@ -133,6 +135,7 @@ impl Cli {
     pub fn execute(self) -> Result<Exit, Failure> {
         match self.verb {
             Verb::Run(args) => run::execute(&args),
+            Verb::Merge(args) => merge::execute(&args),
             Verb::Render(args) => render::execute(&args),
             Verb::Compare(args) => compare::execute(&args),
             Verb::Composite(args) => composite::execute(&args),

@@ -1,5 +1,7 @@
 //! `aogauge run`
 
+mod dry_run;
+
 use super::{Exit, Failure, Format, json, on_gpu::OnGpu, print, tell};
 use crate::{
     judge_cache::JudgeCache,
@@ -10,12 +12,12 @@ use crate::{
         gpu::{Gpu, Persistent},
     },
     report,
-    run::{Observer, Prepared},
+    run::{Means, Observer, Prepared, Shard, ShardRecord, Stop},
     suite::{Plan, Platform, Suite},
 };
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::path::PathBuf;
+use std::{path::PathBuf, time::Duration};
 
 /// Render a suite, measure, judge, and write a record and its report.
 #[derive(Debug, clap::Args)]
@@ -37,6 +39,26 @@ pub struct Args {
     renderer: Choice,
     #[command(flatten)]
     on_gpu: OnGpu,
+    /// Only cases whose scene/estimator/renderer/rays contains this, and those that they
+    /// are compared with.
+    #[arg(long, value_name = "TEXT")]
+    filter: Option<String>,
+    /// Only a part of the run, for `aogauge merge`: K/N, or auto for what GitLab, Slurm,
+    /// Kubernetes, GitHub Actions or AOGAUGE_SHARD say.
+    #[arg(long, value_name = "K/N")]
+    shard: Option<String>,
+    /// End the run at the first case that fails.
+    #[arg(long)]
+    fail_fast: bool,
+    /// A case that renders longer than so many seconds ends with an error.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    case_timeout: Option<Duration>,
+    /// Only say what would be rendered, and what it costs.
+    #[arg(long)]
+    dry_run: bool,
+    /// Do not go on where an unfinished run of the same plan ended; begin anew.
+    #[arg(long)]
+    fresh: bool,
     /// CPU threads; all unless given. Results do not depend on it.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -70,78 +92,178 @@ impl Drop for Bar {
 }
 
 impl Observer for Bar {
-    fn step(&self, done: usize, total: usize, what: &str) {
-        self.0.set_length(total as u64);
-        self.0.set_position(done as u64);
+    fn step(&self, done: u64, total: u64, what: &str) {
+        self.0.set_length(total);
+        self.0.set_position(done);
         self.0.set_message(what.to_owned());
+    }
+}
+
+/// A time of a second or less is no use, and none above a day.
+fn seconds(text: &str) -> Result<Duration, String> {
+    match text.parse::<f64>() {
+        Ok(s) if (0.001..=86_400.0).contains(&s) => Ok(Duration::from_secs_f64(s)),
+        _ => Err("give seconds, 0.001 to 86400".to_owned()),
     }
 }
 
 pub(super) fn bar() -> Bar {
     let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
-    if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len}  {elapsed} (left {eta})  {wide_msg}") {
+    if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3} %  {elapsed} (left {eta})  {wide_msg}") {
         bar.set_style(style);
     }
     // A step may take many seconds; the clock goes on meanwhile.
-    bar.enable_steady_tick(std::time::Duration::from_millis(200));
+    bar.enable_steady_tick(Duration::from_millis(200));
     Bar(bar)
 }
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
     let suite = Suite::load(&args.suite)?;
+    let shard = args.shard.as_deref().map(named).transpose()?;
     let (gpu, missing) = open(args)?;
     let mut pool = rayon::ThreadPoolBuilder::new();
     if let Some(threads) = args.threads {
         pool = pool.num_threads(threads.into());
     }
     let pool = pool.build().map_err(|e| Failure::usage(format!("cannot start {:?} threads: {e}", args.threads)))?;
-    let (record, folder) = pool.install(|| render(args, &suite, gpu, &missing))?;
-    report::write(folder.path(), folder.path())?;
-    tell(&format!(
-        "{}\n{}\n{}: {}",
-        report::table::plain(&record),
-        record.summary_line(),
-        folder.path().join(report::FILE).display(),
-        match exit(&record) {
-            Exit::Pass if record.verdicts.is_empty() => "rendered; the suite has no gates",
-            Exit::Pass => "pass",
-            _ => "not a pass",
-        },
-    ));
-    if args.format == Format::Json {
-        print(&json(&record)?)?;
-    }
-    Ok(exit(&record))
+    pool.install(|| prepare(args, &suite, shard, gpu, &missing))
 }
 
-/// Checks everything, then makes the folder, then renders.
-fn render(
+/// The part that is asked for.
+fn named(shard: &str) -> Result<Shard, Failure> {
+    if shard != "auto" {
+        return shard.parse().map_err(|e| Failure::usage(format!("--shard: {e}")));
+    }
+    let (shard, by) = Shard::of_environment(&|name| std::env::var(name).ok())
+        .map_err(|e| Failure::usage(format!("--shard auto: {e}")))?;
+    tell(&format!("aogauge: shard {shard}, by {by}"));
+    Ok(shard)
+}
+
+/// Checks everything, then does what was asked.
+fn prepare(
     args: &Args,
     suite: &Suite,
+    shard: Option<Shard>,
     gpu: Option<Result<Gpu, RenderError>>,
     missing: &str,
-) -> Result<(Record, RecordFolder), Failure> {
+) -> Result<Exit, Failure> {
     let platform = match &gpu {
         None => Platform::Cpu,
         Some(Ok(gpu)) if gpu.is_software() && args.renderer == Choice::Auto => Platform::SoftwareGpu,
         Some(_) => Platform::Gpu,
     };
-    let plan = Plan::new(suite, platform, args.seed);
+    let mut plan = Plan::new(suite, platform, args.seed);
+    if let Some(filter) = &args.filter {
+        plan = plan.only(filter);
+        if plan.cases.is_empty() {
+            let message = format!("suite '{}' has no case on this machine that contains '{filter}'", suite.name);
+            return Err(Failure { exit: Exit::Nothing, message });
+        }
+    }
+    let prepared = Prepared::new(&plan)?;
+    if args.dry_run {
+        return dry_run::tell_plan(&prepared, shard, &args.out);
+    }
     let machine = match &gpu {
         None => Machine::here(missing.to_owned(), None),
         Some(Ok(gpu)) => Machine::here(gpu.describe(), Some(gpu.is_software())),
         Some(Err(e)) => Machine::here(e.to_string(), None),
     };
     let gpu = gpu.map(Persistent::new);
-    let prepared = Prepared::new(&plan)?;
-    let folder = RecordFolder::create(&args.out)?;
+    let folder = folder(args, &prepared, shard, &machine)?;
     let cache = if args.no_cache { None } else { JudgeCache::of_user() };
-    let record =
-        prepared.run(&Cpu, gpu.as_ref().map(|g| g as &dyn Renderer), cache.as_ref(), machine, &folder, &bar())?;
+    let stop = Stop::default();
+    on_interrupt(&stop);
+    let means = Means {
+        gpu: gpu.as_ref().map(|g| g as &(dyn Renderer + Sync)),
+        cache: cache.as_ref(),
+        stop,
+        case_timeout: args.case_timeout,
+        fail_fast: args.fail_fast,
+        ..Means::new(&Cpu, machine)
+    };
+    if let Some(shard) = shard {
+        let record = prepared.run_shard(shard, &args.suite, &means, &folder, &bar())?;
+        return end_of_shard(args, &record, &folder);
+    }
+    let record = prepared.run(&means, &folder, &bar())?;
     if let Some(trouble) = &record.timing.cache_trouble {
         tell(&format!("aogauge: the judge's images are not kept for the next run: {trouble}"));
     }
-    Ok((record, folder))
+    finish(&record, &folder, args.format)
+}
+
+/// The folder of the record, as an unfinished run of the same plan left it.
+fn folder(
+    args: &Args,
+    prepared: &Prepared<'_>,
+    shard: Option<Shard>,
+    machine: &Machine,
+) -> Result<RecordFolder, Failure> {
+    // Another build of the program may round otherwise.
+    let program = if args.fresh { None } else { crate::judge_cache::program() };
+    let Some(program) = program else { return Ok(RecordFolder::create(&args.out)?) };
+    let shard = shard.map_or_else(String::new, |s| s.to_string());
+    let folder = RecordFolder::resume(&args.out, &format!("{}\n{program}\n{shard}\n", prepared.identity(machine)))?;
+    if folder.is_resumed() {
+        tell("aogauge: going on where an unfinished run of the same plan ended (--fresh begins anew)");
+    }
+    Ok(folder)
+}
+
+/// The first Ctrl-C, or the signal that a scheduler ends a job with, ends the run after
+/// the image it is at; the second ends it at once. What is done is kept either way.
+fn on_interrupt(stop: &Stop) {
+    let stop = stop.clone();
+    let handler = move || {
+        if stop.is_asked() {
+            std::process::exit(Exit::Incomplete as i32);
+        }
+        stop.ask();
+        tell("aogauge: ending after this image; press Ctrl-C again to end at once");
+    };
+    // In one process only the first run can listen; without it Ctrl-C kills, and what is
+    // done is kept on disk anyway.
+    let _ = ctrlc::try_set_handler(handler);
+}
+
+/// Writes the report, and says how it went.
+pub(super) fn finish(record: &Record, folder: &RecordFolder, format: Format) -> Result<Exit, Failure> {
+    report::write(folder.path(), folder.path())?;
+    tell(&format!(
+        "{}\n{}\n{}: {}",
+        report::table::plain(record),
+        record.summary_line(),
+        folder.path().join(report::FILE).display(),
+        match exit(record) {
+            Exit::Pass if record.verdicts.is_empty() => "rendered; the suite has no gates",
+            Exit::Pass => "pass",
+            _ => "not a pass",
+        },
+    ));
+    if record.incomplete.is_some() {
+        tell("aogauge: what is done is kept: the same command goes on from here");
+    }
+    if format == Format::Json {
+        print(&json(record)?)?;
+    }
+    Ok(exit(record))
+}
+
+fn end_of_shard(args: &Args, record: &ShardRecord, folder: &RecordFolder) -> Result<Exit, Failure> {
+    let failed = record.units.iter().filter(|d| d.error.is_some()).count();
+    let end = record.incomplete.as_ref().map_or_else(String::new, |why| format!("; {why}"));
+    tell(&format!(
+        "shard {}: {} units are rendered, {failed} of them failed{end}\n{}: to be merged with the others (aogauge merge)",
+        record.shard,
+        record.units.len(),
+        folder.path().display()
+    ));
+    if args.format == Format::Json {
+        print(&json(record)?)?;
+    }
+    Ok(if failed > 0 || record.incomplete.is_some() { Exit::Incomplete } else { Exit::Pass })
 }
 
 /// The GPU, or why there is none. An adapter that lacks what was asked for costs
@@ -168,7 +290,7 @@ fn open(args: &Args) -> Result<(Option<Result<Gpu, RenderError>>, String), Failu
 
 fn exit(record: &Record) -> Exit {
     let s = &record.summary;
-    if s.failed_cases + s.failed_judges > 0 {
+    if s.failed_cases + s.failed_judges > 0 || record.incomplete.is_some() {
         Exit::Incomplete
     } else if s.fail > 0 {
         Exit::Failed
@@ -217,19 +339,25 @@ within = 0.001
             seed: None,
             renderer: Choice::Gpu,
             threads: None,
+            filter: None,
+            shard: None,
+            fail_fast: false,
+            case_timeout: None,
+            dry_run: false,
+            fresh: true,
             no_cache: true,
             on_gpu: OnGpu::default(),
             format: Format::Text,
         };
         // The first case loads, compiles and runs by then.
-        let (_, folder) = render(&args, &suite, Some(Ok(losing([9]))), "").unwrap();
-        let record = Record::read(folder.path()).unwrap();
+        let exit = prepare(&args, &suite, None, Some(Ok(losing([9]))), "").unwrap();
+        let record = Record::read(&args.out).unwrap();
         let failed: Vec<_> = record.cases.iter().filter(|c| c.error.is_some()).collect();
         assert!(failed.len() == 1 && failed[0].case.renderer == "gpu", "{failed:?}");
         assert!(failed[0].error.as_deref().unwrap().contains("the device was lost"), "{:?}", failed[0].error);
         let whole = record.cases.iter().filter(|c| c.image.is_some() && !c.metrics.is_empty()).count();
         assert_eq!((whole, record.summary.cases, record.summary.pass), (7, 8, 3));
-        assert_eq!(exit(&record), Exit::Incomplete);
+        assert_eq!(exit, Exit::Incomplete);
         assert_eq!(Exit::Incomplete as i32, 5);
     }
 }

@@ -1,16 +1,27 @@
 //! The folder of a record, while a run fills it.
 
 use super::{BEGUN, FILE, Record};
-use crate::disk::{DiskError, write_whole};
+use crate::disk::{DiskError, is_part, read_text, write_whole};
 use std::{
     fs, io,
     path::{Path, PathBuf},
 };
 
-/// A folder that a run fills.
+/// In [`BEGUN`]: what is run, so that the same can go on.
+const PLAN: &str = "plan.txt";
+
+/// In [`BEGUN`]: held by the run that fills the folder.
+const LOCK: &str = "lock";
+
+/// A folder that a run fills. Until the run is done it holds the folder `.aogauge-run`:
+/// what the run is of, a line for every unit that is done, and working images.
 #[derive(Debug)]
 pub struct RecordFolder {
     path: PathBuf,
+    /// Whether an unfinished run of the same plan had begun to fill it.
+    resumed: bool,
+    /// Held while it is filled; the system lets go of it if the run is killed.
+    _lock: fs::File,
 }
 
 impl RecordFolder {
@@ -19,8 +30,22 @@ impl RecordFolder {
     /// that is not empty is refused.
     ///
     /// # Errors
-    /// Where the folder cannot be written, or holds something else.
+    /// Where the folder cannot be written, holds something else, or another run fills
+    /// it right now.
     pub fn create(path: &Path) -> Result<Self, DiskError> {
+        Self::open(path, None)
+    }
+
+    /// The same, but what an unfinished run of the same plan left is kept, so that only
+    /// the rest needs to be done. `plan` is whatever decides what is rendered.
+    ///
+    /// # Errors
+    /// As [`RecordFolder::create`].
+    pub fn resume(path: &Path, plan: &str) -> Result<Self, DiskError> {
+        Self::open(path, Some(plan))
+    }
+
+    fn open(path: &Path, plan: Option<&str>) -> Result<Self, DiskError> {
         // Without a slash at its end, so that a name can be appended.
         let path = &path.components().collect::<PathBuf>();
         if path.file_name().is_none() {
@@ -31,23 +56,40 @@ impl RecordFolder {
             Err(e) if e.kind() == io::ErrorKind::NotFound => false,
             Err(e) => return Err(DiskError::io(path, "use this as the output folder")(e)),
         };
+        let mut resumed = false;
         if occupied {
-            if !path.join(FILE).exists() && !path.join(BEGUN).exists() {
+            let begun = path.join(BEGUN).exists();
+            if !path.join(FILE).exists() && !path.join(super::SHARD).exists() && !begun {
                 return Err(DiskError::content(
                     path,
                     "the output folder holds files that are not a record: name another folder",
                 ));
             }
-            if path.join(FILE).exists() {
+            if begun && path.join(BEGUN).join(LOCK).exists() {
+                // Let go of at once: on some systems a folder with open files cannot be moved.
+                lock(path)?;
+            }
+            resumed = begun && plan.is_some() && read_text(&path.join(BEGUN).join(PLAN)).ok().as_deref() == plan;
+            if resumed {
+                // What it says of units that were not done is about to be wrong.
+                for stale in [FILE, super::SHARD] {
+                    remove(&path.join(stale))?;
+                }
+                sweep(path)?;
+            } else if path.join(FILE).exists() {
                 move_aside(path)?;
             } else {
                 // What a killed run left is worth less than the record before it.
                 fs::remove_dir_all(path).map_err(DiskError::io(path, "remove what an unfinished run left"))?;
             }
         }
-        fs::create_dir_all(path).map_err(DiskError::io(path, "create the output folder"))?;
-        write_whole(&path.join(BEGUN), |_| Ok(()))?;
-        Ok(RecordFolder { path: path.to_owned() })
+        let begun = path.join(BEGUN);
+        fs::create_dir_all(&begun).map_err(DiskError::io(path, "create the output folder"))?;
+        let lock = lock(path)?;
+        if !resumed {
+            write_whole(&begun.join(PLAN), |buffer| io::Write::write_all(buffer, plan.unwrap_or_default().as_bytes()))?;
+        }
+        Ok(RecordFolder { path: path.to_owned(), resumed, _lock: lock })
     }
 
     /// Where it is.
@@ -55,7 +97,23 @@ impl RecordFolder {
         &self.path
     }
 
-    /// Writes `record.json`, which makes the folder a record.
+    /// Whether it goes on where an unfinished run of the same plan ended.
+    pub fn is_resumed(&self) -> bool {
+        self.resumed
+    }
+
+    /// The folder of what the run alone needs.
+    pub(crate) fn work(&self) -> PathBuf {
+        self.path.join(BEGUN)
+    }
+
+    /// A file of what the run alone needs, relative to the record.
+    pub(crate) fn work_file(name: &str) -> PathBuf {
+        Path::new(BEGUN).join(name)
+    }
+
+    /// Writes `record.json`, which makes the folder a record. What the run alone needed
+    /// goes, unless the record is incomplete: the run can go on from it.
     ///
     /// # Errors
     /// Where it cannot be written.
@@ -66,8 +124,51 @@ impl RecordFolder {
         // JSON has no NaN and no infinity: what could not be read must not look whole.
         serde_json::from_str::<Record>(&text).map_err(unfit)?;
         write_whole(&path, |buffer| io::Write::write_all(buffer, format!("{text}\n").as_bytes()))?;
+        if record.incomplete.is_some() {
+            return Ok(());
+        }
         let begun = self.path.join(BEGUN);
-        fs::remove_file(&begun).map_err(DiskError::io(&begun, "remove the mark of a running run"))
+        fs::remove_dir_all(&begun).map_err(DiskError::io(&begun, "remove what the run alone needed"))
+    }
+}
+
+/// Takes the folder for one run.
+fn lock(path: &Path) -> Result<fs::File, DiskError> {
+    let file = path.join(BEGUN).join(LOCK);
+    let opened = fs::File::options().create(true).append(true).open(&file);
+    let opened = opened.map_err(DiskError::io(&file, "open the lock of the run"))?;
+    match opened.try_lock() {
+        Ok(()) => Ok(opened),
+        Err(fs::TryLockError::WouldBlock) => Err(DiskError::content(
+            path,
+            "another run is writing into this folder: wait for it, or name another folder",
+        )),
+        // A file system without locks cannot tell; it is no reason not to run.
+        Err(fs::TryLockError::Error(e)) if e.kind() == io::ErrorKind::Unsupported => Ok(opened),
+        Err(fs::TryLockError::Error(e)) => Err(DiskError::io(&file, "lock the folder of the run")(e)),
+    }
+}
+
+/// Removes what was being written when a run was killed.
+fn sweep(folder: &Path) -> Result<(), DiskError> {
+    let entries = fs::read_dir(folder).map_err(DiskError::io(folder, "list what an unfinished run left"))?;
+    for entry in entries.flatten() {
+        let (path, name) = (entry.path(), entry.file_name());
+        if entry.file_type().is_ok_and(|t| t.is_dir()) {
+            sweep(&path)?;
+        } else if is_part(&name.to_string_lossy()) {
+            remove(&path)?;
+        }
+    }
+    Ok(())
+}
+
+fn remove(file: &Path) -> Result<(), DiskError> {
+    match fs::remove_file(file) {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => {
+            Err(DiskError::io(file, "remove what an unfinished run left")(e))
+        }
+        _ => Ok(()),
     }
 }
 

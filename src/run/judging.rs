@@ -1,23 +1,16 @@
 //! The judge of one scene: traced until it is precise, written, recorded.
 
-use super::{RunError, faults, occluders::JudgedOccluder, set::Set};
+use super::{RunError, occluders::JudgedOccluder, rendering::Rendered, set::Set};
 use crate::{
-    judge_cache::{JudgeCache, Key},
     layers::Layers,
     metrics::{
         Absent, Metric, MetricName,
-        judge::{Judge, JudgedRegions, Pair, QImage, vague},
+        judge::{Judge, JudgedRegions, QImage, vague},
         profile,
     },
-    record::{JudgeRecord, RecordFolder, RegionQ, Stopped, Timing},
-    render::{Geometry, path},
+    record::{JudgeRecord, RecordFolder, RegionQ, Stopped},
     stats::Estimate,
 };
-use std::time::Instant;
-
-/// Added to the seed, so that the judge shares no random numbers with what it
-/// judges.
-const JUDGE: u32 = 0x0010_0000;
 
 /// What the judge found, with its curve.
 pub(super) struct Judged {
@@ -64,24 +57,24 @@ impl Judged {
 }
 
 impl Set<'_> {
-    /// Judges the scene by its twin, and writes Q. Absent where there is nothing to
-    /// judge.
+    /// Judges the scene by the images of its judge, and writes Q. Absent where there is
+    /// nothing to judge.
     pub(super) fn judge(
         &self,
-        cache: Option<&JudgeCache>,
         folder: &RecordFolder,
-        timing: &mut Timing,
+        rendered: &Rendered,
     ) -> Result<Result<Judged, Unjudged>, RunError> {
-        let Some(twin) = &self.twin else {
-            return Ok(Err(Unjudged::Absent(Absent("the scene has no occluder to judge".into()))));
+        let pairs = match &rendered.judge {
+            None => return Ok(Err(Unjudged::Absent(Absent("the scene has no occluder to judge".into())))),
+            Some(Err(why)) => return Ok(Err(Unjudged::Failed(why.clone()))),
+            Some(Ok(pairs)) => pairs,
         };
-        let start = Instant::now();
         let settings = &self.plan.suite.file.judge;
-        let (regions, pairs) = match self.trace_judge(twin, cache, timing) {
-            Ok(traced) => traced,
-            Err(why) => return Ok(Err(why)),
+        let regions = match JudgedRegions::new(pairs, &self.regions) {
+            Ok(regions) => regions,
+            Err(absent) => return Ok(Err(Unjudged::Absent(absent))),
         };
-        let judge = Judge { regions, image: QImage::new(&pairs) };
+        let judge = Judge { regions, image: QImage::new(pairs) };
         if !judge.regions.has_light() {
             return Err(RunError::NoLight { scene: self.scene.name.clone() });
         }
@@ -99,58 +92,17 @@ impl Set<'_> {
             wanted: settings.precision,
             image: self.write_judge(folder, &judge)?,
         };
-        let curve = profile::of_judge(&pairs, self.view.resolution[0] as usize);
-        timing.judges.insert(self.scene.name.clone(), start.elapsed().as_secs_f64());
+        let curve = profile::of_judge(pairs, self.view.resolution[0] as usize);
         let on_screen = match &self.on_screen {
             None => Err(Absent("the suite has no screen-space method".into())),
-            Some(s) => JudgedRegions::new(&pairs, &s.regions).and_then(|j| match j.widest() {
+            Some(s) => JudgedRegions::new(pairs, &s.regions).and_then(|j| match j.widest() {
                 precision if precision <= settings.precision => Ok(j),
                 precision => Err(vague(precision)),
             }),
         };
         let usable = if sure { Ok(()) } else { Err(vague(precision)) };
-        let occluders = self.occluders.iter().map(|o| o.judge(&pairs, settings.precision)).collect();
+        let occluders = self.occluders.iter().map(|o| o.judge(pairs, settings.precision)).collect();
         Ok(Ok(Judged { usable, on_screen, occluders, judge, record, curve }))
-    }
-
-    /// Traces the scene and its twin, adding replicates until every region mean
-    /// is as precise as the suite asks or the budget is spent. Replicates that an
-    /// earlier run traced are taken from the cache; the result is the same.
-    fn trace_judge(
-        &self,
-        twin: &Geometry,
-        cache: Option<&JudgeCache>,
-        timing: &mut Timing,
-    ) -> Result<(JudgedRegions, Vec<Pair>), Unjudged> {
-        let settings = &self.plan.suite.file.judge;
-        let seed = self.plan.seed.wrapping_add(JUDGE);
-        let paths = settings.paths.get();
-        let most = settings.max_replicates.get() as usize;
-        let key = Key { scene: &self.hash, paths, seed };
-        let mut pairs = cache.map_or_else(Vec::new, |c| c.load(&key, self.view.resolution));
-        let cached = pairs.len();
-        let mut used = 0;
-        let judge = loop {
-            used = (used + settings.replicates.get() as usize).min(most);
-            pairs.extend((pairs.len()..used).map(|r| Pair {
-                with: path::irradiance(&self.geometry, &self.gbuffer, paths, seed, r as u32),
-                without: path::irradiance(twin, &self.gbuffer, paths, seed, r as u32),
-            }));
-            faults::check_judge(&pairs[..used], &self.regions, self.view.resolution[0]).map_err(Unjudged::Failed)?;
-            let judge = JudgedRegions::new(&pairs[..used], &self.regions).map_err(Unjudged::Absent)?;
-            if judge.widest() <= settings.precision || used >= most {
-                break judge;
-            }
-        };
-        if let Some(cache) = cache.filter(|_| pairs.len() > cached)
-            && let Err(e) = cache.store(&key, self.view.resolution, &pairs)
-        {
-            // That costs time, not the run.
-            timing.cache_trouble = Some(e.to_string());
-        }
-        timing.cached_replicates.insert(self.scene.name.clone(), cached.min(used));
-        pairs.truncate(used);
-        Ok((judge, pairs))
     }
 
     fn write_judge(&self, folder: &RecordFolder, judge: &Judge) -> Result<String, RunError> {

@@ -1,102 +1,88 @@
 //! A plan becomes a record: render, measure, judge, write.
+//!
+//! A scene is rendered in [units](unit), none of which needs another's images: the
+//! judge, a converged image a method, pictures, and the replicates of each case. Every
+//! finished unit is kept on disk with its hash. All that is measured is measured from
+//! these images afterwards, so a run that goes on where a killed one ended, or that is
+//! put together from shards, comes to the same record.
 
 mod case_metrics;
+mod error;
 mod faults;
+mod journal;
 mod judging;
+mod measuring;
+mod merge;
 mod occluders;
 mod on_screen;
+mod progress;
 mod recording;
+mod rendering;
 mod set;
+mod shard;
+mod stop;
+mod unit;
+
+pub use error::RunError;
+pub use merge::{MergeError, Shards, find as find_shards};
+pub use progress::Observer;
+pub use shard::{Shard, ShardRecord};
+pub use stop::Stop;
 
 use crate::{
-    disk::DiskError,
     gate::Verdict,
     judge_cache::JudgeCache,
+    layers::hex,
     metrics::{Absent, Metric},
     pooled::pooled,
     record::{CaseRecord, IdleGate, Machine, Record, RecordFolder, SceneRecord, SuiteInfo, Summary, Timing, VERSION},
-    render::{RenderError, Renderer},
-    suite::{EstimatorFile, Plan, Suite},
+    render::Renderer,
+    suite::{Case, EstimatorFile, Plan, Suite},
 };
+use error::MAX_GIB;
+use journal::Journal;
+use measuring::NOT_RENDERED;
+use progress::Progress;
+use rendering::{Rendered, Studio};
 use set::Set;
-use std::time::Instant;
+use sha2::{Digest, Sha256};
+use std::time::{Duration, Instant};
+use unit::{Unit, shard_of};
 
-/// Images of one scene that are held at once, at most.
-const MAX_GIB: f64 = 8.0;
-
-/// Why a run ended without a record.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// A file could not be written.
-    #[error(transparent)]
-    Disk(#[from] DiskError),
-    /// The CPU reference could not render, so there is nothing to compare with.
-    #[error("scene '{scene}': {source}")]
-    Render {
-        /// The scene.
-        scene: String,
-        /// Why.
-        source: RenderError,
-    },
-    /// The measure view of a scene looks at the occluder.
-    #[error("scene '{scene}': the measure view sees the occluder '{object}'; measure.clearance must end under it")]
-    SeesOccluder {
-        /// The scene.
-        scene: String,
-        /// The object it sees.
-        object: String,
-    },
-    /// The measure view of a scene cuts off a flank of an occluder that it measures.
-    #[error(
-        "scene '{scene}': the measure view cuts off the {flank} flank of an occluder that it measures; raise measure.resolution[0], {columns} now, so that it spans 2 R to each side where the receiver reaches that far, or turn measure.transect across the occluder"
-    )]
-    CutsFlank {
-        /// The scene.
-        scene: String,
-        /// `left` or `right`.
-        flank: &'static str,
-        /// Width of the view, pixels.
-        columns: u32,
-    },
-    /// No light reaches the receiver, so there is nothing to judge.
-    #[error(
-        "scene '{scene}': no light reaches the receiver even without the occluder; check environment and the openings towards it"
-    )]
-    NoLight {
-        /// The scene.
-        scene: String,
-    },
-    /// The images of a scene would not fit into memory.
-    #[error(
-        "scene '{scene}': its cases would hold {gib:.1} GiB of images at once, more than {MAX_GIB} GiB; lower replicates or measure.resolution"
-    )]
-    TooMuch {
-        /// The scene.
-        scene: String,
-        /// What it would need.
-        gib: f64,
-    },
-    /// The measure view of a scene sees nothing.
-    #[error(
-        "scene '{scene}': the measure view sees no surface; check measure.center, measure.normal and measure.clearance"
-    )]
-    SeesNothing {
-        /// The scene.
-        scene: String,
-    },
+/// With what a plan is run, and what ends it early.
+pub struct Means<'a> {
+    /// Who renders the reference and the cases on `cpu`.
+    pub cpu: &'a (dyn Renderer + Sync),
+    /// Who renders the cases on `gpu`.
+    pub gpu: Option<&'a (dyn Renderer + Sync)>,
+    /// What earlier runs judged.
+    pub cache: Option<&'a JudgeCache>,
+    /// The machine, for the record. A GPU that it calls hardware works beside the CPU.
+    pub machine: Machine,
+    /// Asks it to end early.
+    pub stop: Stop,
+    /// A case that takes longer ends with an error. It is looked at between replicates.
+    pub case_timeout: Option<Duration>,
+    /// Whether the first case that fails ends the run.
+    pub fail_fast: bool,
+    /// Whether all images are there, and a missing one is an error.
+    pub(crate) is_merge: bool,
 }
 
-/// What a run tells about itself on the way.
-pub trait Observer {
-    /// `done` of `total` steps are done, and `what` comes next.
-    fn step(&self, done: usize, total: usize, what: &str);
-}
-
-/// How many steps a plan has: each case, each converged image, the judge and the
-/// pictures of each scene.
-pub fn steps(plan: &Plan<'_>) -> usize {
-    let per_scene = plan.suite.methods.len() + 2;
-    plan.cases.len() + plan.suite.scenes.len() * per_scene
+impl<'a> Means<'a> {
+    /// The CPU alone, and nothing that ends a run early.
+    pub fn new(cpu: &'a (dyn Renderer + Sync), machine: Machine) -> Self {
+        Means {
+            cpu,
+            gpu: None,
+            cache: None,
+            machine,
+            stop: Stop::default(),
+            case_timeout: None,
+            fail_fast: false,
+            is_merge: false,
+        }
+    }
 }
 
 /// A plan whose scenes are loaded and checked. Whatever a scene file gets wrong
@@ -106,6 +92,15 @@ pub struct Prepared<'a> {
     sets: Vec<Set<'a>>,
 }
 
+/// A unit of a plan and what it costs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Step {
+    /// A case's own name, `SCENE/judge`, `SCENE/converged/METHOD` or `SCENE/look`.
+    pub unit: String,
+    /// About so many rays, all segments counted.
+    pub rays: u64,
+}
+
 impl<'a> Prepared<'a> {
     /// Builds the trees, sees what the measure views see, finds the regions, and
     /// makes sure that light reaches what is to be judged.
@@ -113,48 +108,100 @@ impl<'a> Prepared<'a> {
     /// # Errors
     /// [`RunError`], which names the scene and the field.
     pub fn new(plan: &'a Plan<'a>) -> Result<Self, RunError> {
-        let sets = plan.suite.scenes.iter().map(|scene| Set::new(plan, scene)).collect::<Result<_, _>>()?;
+        let sets = plan.scenes().map(|scene| Set::new(plan, scene)).collect::<Result<_, _>>()?;
         Ok(Prepared { plan, sets })
     }
 
-    /// Runs the plan and commits its record.
+    /// What will be rendered, in order; of a shard its own part.
+    pub fn steps(&self, shard: Option<Shard>) -> Vec<Step> {
+        let of = |set: &Set<'a>| {
+            let units = mine(set, shard);
+            units.into_iter().map(|u| step(set, &u)).collect::<Vec<_>>()
+        };
+        self.sets.iter().flat_map(of).collect()
+    }
+
+    /// All of [`Prepared::steps`] together.
+    pub fn cost(&self, shard: Option<Shard>) -> u64 {
+        self.steps(shard).iter().map(|s| s.rays).sum()
+    }
+
+    /// Everything that decides which images come of it, but for the program: the suite,
+    /// the scenes' contents, seed, cases and the GPU, hashed.
+    pub fn identity(&self, machine: &Machine) -> String {
+        let plan = self.plan;
+        let gpu = plan.cases.iter().any(|c| c.renderer == "gpu").then_some(&machine.gpu);
+        let scenes: Vec<[&str; 2]> = self.sets.iter().map(|s| [s.scene.name.as_str(), &s.hash]).collect();
+        let cases: Vec<String> = plan.cases.iter().map(Case::id).collect();
+        let all = serde_json::json!({
+            "tool": env!("CARGO_PKG_VERSION"), "suite": plan.suite.name, "file": plan.suite.file, "scenes": scenes,
+            "cases": cases, "seed": plan.seed, "filter": plan.filter, "gpu": gpu,
+        });
+        hex(&Sha256::digest(all.to_string()))
+    }
+
+    /// Runs the plan and commits its record. What an unfinished run left in the folder
+    /// is not rendered again.
     ///
-    /// A case whose renderer fails ends with its error; the others go on. `gpu`
-    /// is used for the plan's cases on `gpu`, `cache` for what earlier runs judged.
+    /// A unit whose renderer fails, panics or takes too long ends with its error; the
+    /// others go on. Where the run is asked to stop, the record says that it is
+    /// incomplete, and the folder keeps what is needed to go on.
     ///
     /// # Errors
-    /// Where a file cannot be written, or the CPU reference fails.
-    pub fn run(
-        &self,
-        cpu: &dyn Renderer,
-        gpu: Option<&dyn Renderer>,
-        cache: Option<&JudgeCache>,
-        machine: Machine,
-        folder: &RecordFolder,
-        observer: &dyn Observer,
-    ) -> Result<Record, RunError> {
+    /// Where a file cannot be written, or a scene turns out to have no light.
+    pub fn run(&self, means: &Means<'_>, folder: &RecordFolder, observer: &dyn Observer) -> Result<Record, RunError> {
+        let record = self.found(means, folder, observer)?;
+        folder.commit(&record)?;
+        Ok(record)
+    }
+
+    /// Renders what is missing, and measures all.
+    fn found(&self, means: &Means<'_>, folder: &RecordFolder, observer: &dyn Observer) -> Result<Record, RunError> {
         let plan = self.plan;
         let start = Instant::now();
-        let mut timing = Timing {
-            began: jiff::Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string(),
-            threads: rayon::current_num_threads(),
-            ..Timing::default()
-        };
-        let mut progress = Progress { observer, done: 0, total: steps(plan) };
+        let mut timing = timing();
+        let progress = Progress::new(observer, self.cost(None));
         let (mut scenes, mut cases) = (Vec::new(), Vec::new());
+        let mut ended = None;
         for set in &self.sets {
-            let (scene_record, case_records) = set.run(cpu, gpu, cache, folder, &mut progress, &mut timing)?;
-            scenes.push(scene_record);
-            cases.extend(case_records);
+            let studio = Studio { set, means, journal: Journal { folder }, progress: &progress };
+            let mut rendered = Rendered::default();
+            studio.render(&set.units(), plan.suite.file.replicates.get(), &mut rendered)?;
+            rendered.note(&set.scene.name, &mut timing);
+            let (scene, records) = set.measure(folder, &rendered)?;
+            scenes.extend(scene);
+            let failed = records.iter().find(|c| c.error.as_deref().is_some_and(|e| e != NOT_RENDERED));
+            if let Some(case) = failed.filter(|_| means.fail_fast && !means.stop.is_asked()) {
+                ended = Some(format!("it ended at the first failure (--fail-fast): {}", case.case.id()));
+                means.stop.ask();
+            }
+            cases.extend(records);
+        }
+        if means.stop.is_asked() && ended.is_none() && cases.iter().any(|c| c.error.as_deref() == Some(NOT_RENDERED)) {
+            ended = Some("it was interrupted".to_owned());
         }
         timing.seconds = start.elapsed().as_secs_f64();
+        Ok(self.record(means.machine.clone(), timing, ended, scenes, cases))
+    }
+
+    fn record(
+        &self,
+        machine: Machine,
+        timing: Timing,
+        incomplete: Option<String>,
+        scenes: Vec<SceneRecord>,
+        cases: Vec<CaseRecord>,
+    ) -> Record {
+        let plan = self.plan;
         let (verdicts, idle_gates) = verdicts(plan, &machine, &scenes, &cases);
-        let suite = suite_info(plan.suite);
-        let record = Record {
+        let suite = suite_info(plan);
+        Record {
             version: VERSION,
             tool: env!("CARGO_PKG_VERSION").to_owned(),
             seed: plan.seed,
             machine,
+            filter: plan.filter.clone(),
+            incomplete,
             summary: Summary::new(&verdicts, &idle_gates, &scenes, &cases),
             pooled: pooled(&suite, &scenes, &cases),
             verdicts,
@@ -163,21 +210,41 @@ impl<'a> Prepared<'a> {
             cases,
             suite,
             timing,
-        };
-        folder.commit(&record)?;
-        Ok(record)
+        }
     }
 }
 
-fn suite_info(suite: &Suite) -> SuiteInfo {
+/// The units of a scene; of a shard its own part.
+fn mine<'a>(set: &Set<'a>, shard: Option<Shard>) -> Vec<Unit<'a>> {
+    let is_mine =
+        |unit: &Unit<'a>| shard.is_none_or(|s| shard_of(&unit.id(set.plan, &set.scene.name), s.of) == s.index - 1);
+    set.units().into_iter().filter(is_mine).collect()
+}
+
+fn step(set: &Set<'_>, unit: &Unit<'_>) -> Step {
+    Step { unit: unit.id(set.plan, &set.scene.name), rays: unit.cost(set.plan, set.pixels()) }
+}
+
+/// A clock that begins now.
+fn timing() -> Timing {
+    Timing {
+        began: jiff::Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string(),
+        threads: rayon::current_num_threads(),
+        ..Timing::default()
+    }
+}
+
+fn suite_info(plan: &Plan<'_>) -> SuiteInfo {
+    let suite: &Suite = plan.suite;
+    let methods = || plan.methods().into_iter().map(|m| &suite.methods[m]);
     SuiteInfo {
         name: suite.name.clone(),
         description: suite.file.description.clone(),
         replicates: suite.file.replicates.get(),
         converged_rays: suite.file.converged_rays.get(),
         golden_rays: suite.file.golden_rays.map(crate::suite::Rays::get),
-        estimators: suite.methods.iter().map(|m| m.name.clone()).collect(),
-        methods: suite.methods.iter().map(|m| (m.name.clone(), EstimatorFile::of(&m.estimator))).collect(),
+        estimators: methods().map(|m| m.name.clone()).collect(),
+        methods: methods().map(|m| (m.name.clone(), EstimatorFile::of(&m.estimator))).collect(),
         classic: suite.methods[suite.classic()].name.clone(),
     }
 }
@@ -210,11 +277,14 @@ fn verdicts(
             let reason = format!("this run used no GPU: {}", machine.gpu);
             idle.push(IdleGate { gate: gate.name.clone(), reason, excused });
         } else if verdicts.len() == before {
-            let reason = "no case of this run has this metric".to_owned();
-            idle.push(IdleGate { gate: gate.name.clone(), reason, excused });
+            let reason = match &plan.filter {
+                Some(filter) => format!("no case that was asked for (--filter {filter}) has this metric"),
+                None => "no case of this run has this metric".to_owned(),
+            };
+            idle.push(IdleGate { gate: gate.name.clone(), reason, excused: plan.filter.is_some() });
         } else {
             // A scene that the gate names must not drop out of it unseen.
-            for scene in &gate.scenes {
+            for scene in gate.scenes.iter().filter(|_| plan.filter.is_none()) {
                 if !verdicts[before..].iter().any(|v: &Verdict| v.scene == *scene) {
                     let absent = Absent("no case of this scene has this metric".into());
                     verdicts.push(gate.verdict(scene, None, &Metric::new(gate.metric, gate.region, Err(absent))));
@@ -224,20 +294,4 @@ fn verdicts(
     }
     verdicts.sort_by_key(|v| v.outcome);
     (verdicts, idle)
-}
-
-struct Progress<'a> {
-    observer: &'a dyn Observer,
-    done: usize,
-    total: usize,
-}
-
-impl Progress<'_> {
-    fn begin(&self, what: &str) {
-        self.observer.step(self.done, self.total, what);
-    }
-
-    fn end(&mut self) {
-        self.done += 1;
-    }
 }

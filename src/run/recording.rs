@@ -2,8 +2,10 @@
 
 use super::{
     RunError,
+    journal::look_image,
     judging::{Judged, Unjudged},
-    set::{Images, Set, Truth, measured},
+    rendering::Rendered,
+    set::{Set, measured},
 };
 use crate::{
     layers::Layers,
@@ -15,7 +17,6 @@ use crate::{
         regions::Region,
     },
     record::{RecordFolder, SceneRecord},
-    render::RenderError,
     suite::{Case, Rays},
 };
 use std::collections::BTreeMap;
@@ -24,10 +25,9 @@ impl Set<'_> {
     pub(super) fn scene_record(
         &self,
         folder: &RecordFolder,
-        images: &BTreeMap<String, Result<Images, RenderError>>,
-        truths: &[Truth],
+        rendered: &Rendered,
         judged: Result<Judged, Unjudged>,
-        look: String,
+        count: &dyn Fn(&Case) -> u32,
     ) -> Result<SceneRecord, RunError> {
         let methods = &self.plan.suite.methods;
         let pixels = self.view.pixels();
@@ -41,8 +41,8 @@ impl Set<'_> {
             layers = layers.with(&format!("region-{}", region.label()), self.regions.mask(region, pixels));
         }
         let mut brighter = BTreeMap::new();
-        for (index, (method, truth)) in methods.iter().zip(truths).enumerate() {
-            let converged = &truth.converged;
+        for (&index, truth) in &rendered.truths {
+            let (method, converged) = (&methods[index], &truth.converged);
             if let Ok(side) = measured(&[], converged, self.regions(index)).brighter() {
                 brighter.insert(method.name.clone(), side);
             }
@@ -56,10 +56,7 @@ impl Set<'_> {
         let mut profiles: Vec<profile::Curve> = self
             .cases()
             .filter(|c| c.renderer == "cpu" && c.rays == most(self.method(c)))
-            .filter_map(|c| {
-                let own = images.get(&c.id())?.as_ref().ok()?;
-                Some(profile::of_method(&c.estimator, &own.replicates, width as usize))
-            })
+            .filter_map(|c| Some(profile::of_method(&c.estimator, rendered.replicates(c, count)?, width as usize)))
             .collect();
         let (judge, no_judge, judge_error) = match judged {
             Ok(judged) => {
@@ -88,20 +85,16 @@ impl Set<'_> {
             no_judge,
             judge_error,
             occluders,
-            convergence: self.convergence(images, truths),
+            convergence: self.convergence(rendered, count),
             profiles,
             image,
-            look,
+            look: look_image(&self.scene.name),
         })
     }
 
     /// How each method converges on each renderer: over all pixels, and over the
     /// footprint where there is one.
-    fn convergence(
-        &self,
-        images: &BTreeMap<String, Result<Images, RenderError>>,
-        truths: &[Truth],
-    ) -> Vec<Convergence> {
+    fn convergence(&self, rendered: &Rendered, count: &dyn Fn(&Case) -> u32) -> Vec<Convergence> {
         let mut keys: Vec<(&str, &str)> = Vec::new();
         for case in self.cases() {
             let key = (case.estimator.as_str(), case.renderer.as_str());
@@ -113,18 +106,16 @@ impl Set<'_> {
         for (estimator, renderer) in keys {
             let of_key = |c: &&Case| c.estimator == estimator && c.renderer == renderer;
             let Some(index) = self.cases().find(of_key).map(|c| self.method(c)) else { continue };
-            let rendered = self.cases().filter(of_key).filter_map(|c| Some((c.rays, images.get(&c.id())?)));
-            let levels: Vec<Level<'_>> = rendered
-                .filter_map(|(rays, i)| Some(Level { rays, replicates: &i.as_ref().ok()?.replicates }))
-                .collect();
+            let Some(truth) = rendered.truths.get(&index) else { continue };
+            let level = |c: &Case| Some(Level { rays: c.rays, replicates: rendered.replicates(c, count)? });
+            let levels: Vec<Level<'_>> = self.cases().filter(of_key).filter_map(level).collect();
             let regions = self.regions(index);
             for region in [Region::All, Region::Footprint] {
                 if levels.is_empty() || (region == Region::Footprint && !self.scene.has_occluder()) {
                     continue;
                 }
                 let (levels, pixels) = (levels.clone(), regions.measurable(region));
-                let truth = &truths[index].converged;
-                found.push(convergence([estimator, renderer], region, levels, truth, pixels, target));
+                found.push(convergence([estimator, renderer], region, levels, &truth.converged, pixels, target));
             }
         }
         found

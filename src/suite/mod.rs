@@ -195,6 +195,14 @@ impl Suite {
         Ok(Suite { name: name.to_owned(), file: parsed, scenes, methods, gates })
     }
 
+    /// The case of classic AO that a case is compared with: the one of as many
+    /// rays, else, for a method with its own number of rays, that of the most.
+    pub fn classic_beside(&self, case: &Case) -> Case {
+        let all = || self.file.rays.iter().map(|r| r.get());
+        let rays = if all().any(|r| r == case.rays) { case.rays } else { all().max().unwrap_or(case.rays) };
+        Case { estimator: self.methods[self.classic()].name.clone(), rays, ..case.clone() }
+    }
+
     /// The index of the method that is classic AO.
     pub fn classic(&self) -> usize {
         self.methods.iter().position(Method::is_classic).unwrap_or(0)

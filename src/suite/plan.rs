@@ -1,11 +1,13 @@
 //! The cases of a suite on a machine.
 
 use super::Suite;
+use crate::scenes::Scene;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What there is to render on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Platform {
     /// The CPU alone.
     Cpu,
@@ -45,6 +47,11 @@ pub struct Plan<'a> {
     pub cases: Vec<Case>,
     /// Seed of all randomness.
     pub seed: u32,
+    /// What there is to render on.
+    pub platform: Platform,
+    /// What the names of cases had to contain, where only some were asked for. The
+    /// cases that those are compared with are in the plan, too.
+    pub filter: Option<String>,
 }
 
 impl<'a> Plan<'a> {
@@ -80,6 +87,32 @@ impl<'a> Plan<'a> {
                 }
             }
         }
-        Plan { suite, cases, seed: seed.unwrap_or(suite.file.seed) }
+        Plan { suite, cases, seed: seed.unwrap_or(suite.file.seed), platform, filter: None }
+    }
+
+    /// Keeps the cases whose `scene/estimator/renderer/rays` contains a text, and those
+    /// that they are compared with: classic AO beside them, and the CPU's image beside
+    /// the GPU's.
+    pub fn only(mut self, filter: &str) -> Self {
+        let mut wanted: Vec<Case> = self.cases.iter().filter(|c| c.id().contains(filter)).cloned().collect();
+        for case in wanted.clone() {
+            let on_cpu = Case { renderer: "cpu".into(), ..case.clone() };
+            wanted.extend([self.suite.classic_beside(&case), self.suite.classic_beside(&on_cpu), on_cpu]);
+        }
+        self.cases.retain(|c| wanted.contains(c));
+        self.filter = Some(filter.to_owned());
+        self
+    }
+
+    /// The scenes that have a case, in the suite's order.
+    pub fn scenes(&self) -> impl Iterator<Item = &'a Scene> {
+        let suite = self.suite;
+        suite.scenes.iter().filter(|s| self.cases.iter().any(|c| c.scene == s.name))
+    }
+
+    /// The methods that have a case, by their index in the suite.
+    pub fn methods(&self) -> Vec<usize> {
+        let of = |name: &str| self.cases.iter().any(|c| c.estimator == name);
+        (0..self.suite.methods.len()).filter(|&m| of(&self.suite.methods[m].name)).collect()
     }
 }

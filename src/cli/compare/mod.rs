@@ -200,7 +200,13 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     };
     let found = if folders {
         let bar = bar();
-        compare(&args.reference, &args.test, &settings, &|done, of, what| bar.step(done, of, what), &mut drawn)
+        compare(
+            &args.reference,
+            &args.test,
+            &settings,
+            &|done, of, what| bar.step(done as u64, of as u64, what),
+            &mut drawn,
+        )
     } else {
         compare(&args.reference, &args.test, &settings, &|_, _, _| {}, &mut drawn)
     }?;

@@ -1,0 +1,130 @@
+//! The metrics of a scene's cases, from their images.
+
+use super::{
+    RunError,
+    case_metrics::{Others, metrics},
+    journal::case_image,
+    judging::{Judged, Unjudged},
+    occluders::Occluder,
+    on_screen::is_on_screen,
+    rendering::{Rendered, Truth},
+    set::{Set, measured},
+};
+use crate::{
+    metrics::{Absent, artifact::Method as Measured, judge::JudgedRegions, regions::Regions},
+    record::{CaseRecord, OccluderMetrics, RecordFolder, SceneRecord},
+    suite::Case,
+};
+
+/// What is said of a case that the run did not come to.
+pub(super) const NOT_RENDERED: &str = "the run ended before it was rendered";
+
+impl Set<'_> {
+    /// What was found in the scene and its cases. Where the judge, a converged image or
+    /// the pictures are missing, there is no scene, and its cases say so.
+    pub(super) fn measure(
+        &self,
+        folder: &RecordFolder,
+        rendered: &Rendered,
+    ) -> Result<(Option<SceneRecord>, Vec<CaseRecord>), RunError> {
+        let count = |_: &Case| self.plan.suite.file.replicates.get();
+        let missing = match &rendered.look {
+            Some(Err(why)) => Some(format!("the scene's pictures could not be rendered: {why}")),
+            None => Some(NOT_RENDERED.to_owned()),
+            Some(Ok(())) => None,
+        };
+        let short = self.plan.methods().iter().any(|m| !rendered.truths.contains_key(m))
+            || (self.twin.is_some() && rendered.judge.is_none());
+        if let Some(why) = missing.or_else(|| short.then(|| NOT_RENDERED.to_owned())) {
+            return Ok((None, self.cases().map(|c| CaseRecord::failed(c, why.clone())).collect()));
+        }
+        let judged = self.judge(folder, rendered)?;
+        let cases = self.case_records(rendered, &judged, &count);
+        let scene = self.scene_record(folder, rendered, judged, &count)?;
+        Ok((Some(scene), cases))
+    }
+
+    /// The judge of the pixels that a method is measured on.
+    fn judge_of<'b>(&self, method: usize, judged: &'b Result<Judged, Unjudged>) -> Result<&'b JudgedRegions, Absent> {
+        let judged = judged.as_ref().map_err(Unjudged::absent)?;
+        if is_on_screen(&self.plan.suite.methods[method]) {
+            return judged.on_screen.as_ref().map_err(Clone::clone);
+        }
+        judged.usable.clone().map(|()| &judged.judge.regions)
+    }
+
+    /// What was found in each case, from the first `count` replicates of its images.
+    pub(super) fn case_records(
+        &self,
+        rendered: &Rendered,
+        judged: &Result<Judged, Unjudged>,
+        count: &dyn Fn(&Case) -> u32,
+    ) -> Vec<CaseRecord> {
+        let classic = &self.plan.suite.methods[self.plan.suite.classic()].name;
+        let images = |case: &Case| rendered.replicates(case, count);
+        let truth = |case: &Case| rendered.truths.get(&self.method(case));
+        let mut records = Vec::new();
+        for case in self.cases() {
+            let index = self.method(case);
+            let own = match (rendered.images.get(&case.id()), truth(case)) {
+                (Some(Ok(own)), Some(Truth { converged, fault: None })) => Ok((own, converged)),
+                (Some(Err(e)), _) => Err(e.clone()),
+                (_, Some(Truth { fault: Some(e), .. })) => Err(format!("its converged image cannot be used: {e}")),
+                (None, _) | (_, None) => Err(NOT_RENDERED.to_owned()),
+            };
+            let (own, replicates, converged) = match own {
+                Ok((own, converged)) => (own, images(case).unwrap_or(&own.replicates), converged),
+                Err(e) => {
+                    records.push(CaseRecord::failed(case, e));
+                    continue;
+                }
+            };
+            let regions = self.regions(index);
+            let method = measured(replicates, converged, regions);
+            let on_classic = self.plan.suite.classic_beside(case);
+            let beside = truth(&on_classic).filter(|t| case.estimator != *classic && t.fault.is_none());
+            let classic_on =
+                |regions| beside.and_then(|truth| Some(measured(images(&on_classic)?, &truth.converged, regions)));
+            let on_cpu = Case { renderer: "cpu".into(), ..case.clone() };
+            let cpu = images(&on_cpu).filter(|_| case.renderer != "cpu");
+            let others = Others {
+                classic: classic_on(regions),
+                cpu,
+                judge: self.judge_of(index, judged),
+                image: judged.as_ref().map_err(Unjudged::absent).and_then(Judged::image),
+                occluder: self.scene.has_occluder(),
+            };
+            records.push(CaseRecord {
+                case: case.clone(),
+                error: None,
+                image: Some(case_image(case)),
+                hash: Some(own.hash.clone()),
+                metrics: metrics(&method, &others),
+                occluders: self.by_occluder(index, &method, &classic_on, judged),
+            });
+        }
+        records
+    }
+
+    /// The metrics of a case under each occluder of several.
+    fn by_occluder<'b>(
+        &'b self,
+        index: usize,
+        method: &Measured<'b>,
+        classic: &dyn Fn(&'b Regions) -> Option<Measured<'b>>,
+        judged: &Result<Judged, Unjudged>,
+    ) -> Vec<OccluderMetrics> {
+        let on_screen = is_on_screen(&self.plan.suite.methods[index]);
+        let judged = judged.as_ref().map_err(Unjudged::absent);
+        let image = judged.clone().and_then(Judged::image);
+        let of = |(i, occluder): (usize, &'b Occluder)| {
+            let regions = occluder.shown.as_ref().filter(|_| on_screen).unwrap_or(&occluder.regions);
+            let own = Measured { regions, ..*method };
+            let judge = judged
+                .clone()
+                .and_then(|j| j.occluder(i, on_screen).ok_or_else(|| Absent("the occluder was not judged".into())));
+            occluder.metrics(&own, classic(regions).as_ref(), &judge, &image)
+        };
+        self.occluders.iter().enumerate().map(of).collect()
+    }
+}

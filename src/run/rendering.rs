@@ -1,0 +1,497 @@
+//! The images of one scene: rendered, or taken from what an unfinished run left. The
+//! CPU and a hardware GPU work side by side; a software GPU is the CPU, and waits.
+
+use super::{
+    Means, Progress,
+    journal::{self, Done, Journal},
+    set::Set,
+    stop::Halt,
+    unit::{CONVERGED_REPLICATES, Unit},
+};
+use crate::{
+    disk::DiskError,
+    judge_cache::{JudgeCache, Key},
+    layers::{Layers, pixel_hash},
+    metrics::{
+        artifact::Converged,
+        judge::{JudgedRegions, Pair},
+    },
+    record::Timing,
+    render::{Geometry, Job, Loaded, RenderError, gbuffer::GBuffer, path},
+    stats::mean_variance,
+    suite::Case,
+};
+use std::{
+    collections::BTreeMap,
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::{Mutex, PoisonError},
+    thread,
+    time::{Duration, Instant},
+};
+
+/// Added to the seed for images that must not share random numbers with the
+/// replicates they are compared with.
+const CONVERGED: u32 = 0x00c0_0000;
+const LOOK: u32 = 0x0001_0000;
+
+/// Added to the seed, so that the judge shares no random numbers with what it
+/// judges.
+const JUDGE: u32 = 0x0010_0000;
+
+/// The images of one case.
+#[derive(Clone, Debug)]
+pub(super) struct Images {
+    pub replicates: Vec<Vec<f32>>,
+    /// Hash of their mean.
+    pub hash: String,
+    /// Seconds of tracing.
+    pub seconds: f64,
+}
+
+/// What the images of a method are compared with.
+#[derive(Clone, Debug)]
+pub(super) struct Truth {
+    pub converged: Converged,
+    /// Why it must not be used.
+    pub fault: Option<String>,
+}
+
+/// The images of one scene, as far as they are rendered.
+#[derive(Default)]
+pub(super) struct Rendered {
+    /// Absent also where there is nothing to judge.
+    pub judge: Option<Result<Vec<Pair>, String>>,
+    /// By the method's index in the suite.
+    pub truths: BTreeMap<usize, Truth>,
+    pub look: Option<Result<(), String>>,
+    /// By the case's id.
+    pub images: BTreeMap<String, Result<Images, String>>,
+    /// What it took, a unit each.
+    pub done: Vec<Done>,
+    /// Why the judge's images could not be kept for other runs.
+    pub cache_trouble: Option<String>,
+}
+
+/// Images of a unit, as they were rendered.
+enum Product {
+    Judge(Vec<Pair>, usize),
+    Converged(Truth),
+    Look(Layers),
+    Case(Images),
+}
+
+/// One scene with all that is needed to render it.
+pub(super) struct Studio<'a> {
+    pub set: &'a Set<'a>,
+    pub means: &'a Means<'a>,
+    pub journal: Journal<'a>,
+    pub progress: &'a Progress<'a>,
+}
+
+impl Studio<'_> {
+    /// Renders units, cases up to so many replicates, unless they are there.
+    ///
+    /// # Errors
+    /// Where a file cannot be written. What a renderer gets wrong costs its unit alone.
+    pub fn render(&self, units: &[Unit<'_>], replicates: u32, rendered: &mut Rendered) -> Result<(), DiskError> {
+        let (on_gpu, on_cpu): (Vec<&Unit<'_>>, Vec<&Unit<'_>>) = units.iter().partition(|u| u.is_on_gpu());
+        let shared = Mutex::new((rendered, Ok(())));
+        // Of this thread; the GPU's is opened by the thread that uses it.
+        let cpu_lane = || {
+            let mut loaded = None;
+            let open = || self.means.cpu.load(&self.set.geometry);
+            self.lane(&on_cpu, replicates, &mut loaded, &open, &shared);
+        };
+        let gpu = self.means.gpu;
+        let gpu_lane = || {
+            let mut loaded = None;
+            let none = || RenderError::NoAdapter("the plan asks for one".into());
+            let open = || gpu.ok_or_else(none).and_then(|g| g.load(&self.set.geometry));
+            self.lane(&on_gpu, replicates, &mut loaded, &open, &shared);
+        };
+        if self.means.machine.gpu_is_software == Some(false) && !on_gpu.is_empty() && !on_cpu.is_empty() {
+            self.side_by_side(cpu_lane, gpu_lane);
+        } else {
+            cpu_lane();
+            gpu_lane();
+        }
+        shared.into_inner().unwrap_or_else(PoisonError::into_inner).1
+    }
+
+    /// The GPU's units on a thread of their own: it waits for the device and needs no core.
+    fn side_by_side(&self, cpu: impl FnOnce(), gpu: impl FnOnce() + Send) {
+        thread::scope(|scope| {
+            scope.spawn(gpu);
+            cpu();
+        });
+    }
+
+    fn lane<'l>(
+        &self,
+        units: &[&Unit<'_>],
+        replicates: u32,
+        loaded: &mut Option<Result<Box<dyn Loaded + 'l>, RenderError>>,
+        open: &dyn Fn() -> Result<Box<dyn Loaded + 'l>, RenderError>,
+        shared: &Mutex<(&mut Rendered, Result<(), DiskError>)>,
+    ) {
+        for unit in units {
+            if self.means.stop.is_asked() {
+                return;
+            }
+            let id = unit.id(self.set.plan, &self.set.scene.name);
+            self.progress.begin(&id);
+            let known = {
+                let guard = shared.lock().unwrap_or_else(PoisonError::into_inner);
+                match unit {
+                    Unit::Case(case) => match guard.0.images.get(&case.id()) {
+                        Some(Ok(images)) => Some(images.clone()),
+                        Some(Err(_)) => continue,
+                        None => None,
+                    },
+                    _ => None,
+                }
+            };
+            let found = self.unit(unit, &id, replicates, known, loaded, open);
+            let mut guard = shared.lock().unwrap_or_else(PoisonError::into_inner);
+            match found {
+                Ok(Some((product, done, trouble))) => {
+                    guard.0.cache_trouble = guard.0.cache_trouble.take().or(trouble);
+                    guard.0.take(unit, product, done, self.set.view.pixels());
+                }
+                Ok(None) => return,
+                Err(e) => {
+                    guard.1 = Err(e);
+                    self.means.stop.ask();
+                    return;
+                }
+            }
+            self.progress.end(unit.cost(self.set.plan, self.set.pixels()));
+        }
+    }
+
+    /// One unit, from the journal or rendered; None where the run ends before it is done.
+    #[allow(clippy::type_complexity)]
+    fn unit<'l>(
+        &self,
+        unit: &Unit<'_>,
+        id: &str,
+        replicates: u32,
+        known: Option<Images>,
+        loaded: &mut Option<Result<Box<dyn Loaded + 'l>, RenderError>>,
+        open: &dyn Fn() -> Result<Box<dyn Loaded + 'l>, RenderError>,
+    ) -> Result<Option<(Result<Product, String>, Done, Option<String>)>, DiskError> {
+        let start = Instant::now();
+        let file = journal::file(self.set.plan, &self.set.scene.name, unit);
+        let path = self.journal.folder.path().join(&file);
+        let mut known = known;
+        if let Some(done) = self.journal.find(id, &file) {
+            if let Some(error) = done.error.clone().filter(|_| self.means.is_merge) {
+                return Ok(Some((Err(error), done, None)));
+            }
+            if known.is_none()
+                && let Some(product) = self.read(unit, &path, &done)
+            {
+                match product {
+                    Product::Case(images) if images.replicates.len() < replicates as usize => known = Some(images),
+                    product => return Ok(Some((Ok(product), done, None))),
+                }
+            }
+        }
+        let mut trouble = None;
+        let mut render = || -> Result<Product, Halt> {
+            if self.means.is_merge {
+                return Err(Halt::Failed("no shard holds its images".into()));
+            }
+            if *unit == Unit::Judge {
+                return self.trace_judge(&mut trouble).map(|(pairs, cached)| Product::Judge(pairs, cached));
+            }
+            let loaded = loaded.get_or_insert_with(open).as_mut().map_err(|e| Halt::Failed(e.to_string()))?;
+            match unit {
+                Unit::Converged(method) => self.converged(*method, loaded.as_mut()).map(Product::Converged),
+                Unit::Case(case) => self.case(case, replicates, known.take(), loaded.as_mut()).map(Product::Case),
+                _ => self.look(loaded.as_mut()).map(Product::Look),
+            }
+        };
+        let product = match catch_unwind(AssertUnwindSafe(&mut render)) {
+            Ok(Ok(product)) => Ok(product),
+            Ok(Err(Halt::Stopped)) => return Ok(None),
+            Ok(Err(Halt::Failed(why))) => Err(why),
+            Err(panic) => {
+                // What it was in the middle of must not be used again.
+                *loaded = None;
+                Err(format!("the renderer panicked: {}", message(panic.as_ref())))
+            }
+        };
+        let (seconds, cached) = match &product {
+            Ok(Product::Case(images)) => (images.seconds, 0),
+            Ok(Product::Judge(_, cached)) => (start.elapsed().as_secs_f64(), *cached),
+            _ => (start.elapsed().as_secs_f64(), 0),
+        };
+        let error = product.as_ref().err().cloned();
+        let mut done = Done { unit: id.to_owned(), seconds, sha256: None, error, cached };
+        if let Ok(product) = &product {
+            self.layers(unit, product).write(&path)?;
+            done.sha256 = Some(journal::sha256(&path)?);
+        }
+        self.journal.note(&done)?;
+        Ok(Some((product, done, trouble)))
+    }
+
+    /// The images of a unit as the file that they are kept in.
+    fn layers(&self, unit: &Unit<'_>, product: &Product) -> Layers {
+        let size = self.set.view.resolution;
+        let all = |layers: Layers, replicates: &[Vec<f32>]| {
+            replicates.iter().enumerate().fold(layers, |l, (r, v)| l.with(&journal::replicate(r), v.clone()))
+        };
+        match (unit, product) {
+            (_, Product::Judge(pairs, _)) => journal::of_pairs(size, pairs),
+            (_, Product::Converged(truth)) => {
+                let mut layers = all(Layers::new(size), &truth.converged.replicates);
+                layers.attributes.extend(truth.fault.clone().map(|why| ("fault".to_owned(), why)));
+                layers
+            }
+            (_, Product::Look(layers)) => layers.clone(),
+            (Unit::Case(case), Product::Case(images)) => {
+                let (mean, variance) = moments(&images.replicates, self.set.view.pixels());
+                let mut layers =
+                    all(Layers::new(size).with("mean", mean).with("variance", variance), &images.replicates);
+                // What whoever compares the file alone must know.
+                let attributes = [
+                    ("scene", case.scene.clone()),
+                    ("estimator", case.estimator.clone()),
+                    ("renderer", case.renderer.clone()),
+                    ("rays", case.rays.to_string()),
+                    ("seed", self.set.plan.seed.to_string()),
+                ];
+                layers.attributes.extend(attributes.map(|(name, text)| (name.to_owned(), text)));
+                layers
+            }
+            (_, Product::Case(images)) => all(Layers::new(size), &images.replicates),
+        }
+    }
+
+    /// Reads what [`Studio::layers`] made; None where it is not what it should be.
+    fn read(&self, unit: &Unit<'_>, path: &std::path::Path, done: &Done) -> Option<Product> {
+        done.sha256.as_ref()?;
+        let layers = Layers::read(path).ok()?;
+        let fits = layers.resolution == self.set.view.resolution;
+        Some(match unit {
+            Unit::Judge => Product::Judge(Some(journal::pairs(&layers)).filter(|_| fits)?, done.cached),
+            Unit::Converged(_) => {
+                let replicates = journal::replicates(&layers);
+                if !fits || replicates.len() != CONVERGED_REPLICATES as usize {
+                    return None;
+                }
+                let fault = layers.attributes.get("fault").cloned();
+                Product::Converged(Truth { converged: Converged::new(replicates), fault })
+            }
+            Unit::Look => Product::Look(layers),
+            Unit::Case(_) => {
+                let replicates = journal::replicates(&layers);
+                let hash = layers.get("mean").map(pixel_hash).filter(|_| fits && replicates.len() > 1)?;
+                Product::Case(Images { replicates, hash, seconds: done.seconds })
+            }
+        })
+    }
+
+    /// Traces the scene and its twin, adding replicates until every region mean
+    /// is as precise as the suite asks or the budget is spent. Replicates that an
+    /// earlier run traced are taken from the cache; the result is the same.
+    fn trace_judge(&self, trouble: &mut Option<String>) -> Result<(Vec<Pair>, usize), Halt> {
+        let set = self.set;
+        let Some(twin) = &set.twin else { return Ok((Vec::new(), 0)) };
+        let settings = &set.plan.suite.file.judge;
+        let seed = set.plan.seed.wrapping_add(JUDGE);
+        let paths = settings.paths.get();
+        let most = settings.max_replicates.get() as usize;
+        let key = Key { scene: &set.hash, paths, seed };
+        let load = |c: &JudgeCache| c.load(&key, set.view.resolution);
+        let mut pairs = self.means.cache.map_or_else(Vec::new, load);
+        let cached = pairs.len();
+        let mut used = 0;
+        let of = |geometry: &Geometry, r: usize| path::irradiance(geometry, &set.gbuffer, paths, seed, r as u32);
+        let mut stopped = false;
+        loop {
+            used = (used + settings.replicates.get() as usize).min(most);
+            while pairs.len() < used && !stopped {
+                let r = pairs.len();
+                pairs.push(Pair { with: of(&set.geometry, r), without: of(twin, r) });
+                stopped = self.means.stop.is_asked();
+            }
+            if stopped {
+                break;
+            }
+            super::faults::check_judge(&pairs[..used], &set.regions, set.view.resolution[0]).map_err(Halt::Failed)?;
+            // Where regions are too small for a judge, measuring says so.
+            let Ok(judge) = JudgedRegions::new(&pairs[..used], &set.regions) else { break };
+            if judge.widest() <= settings.precision || used >= most {
+                break;
+            }
+        }
+        if let Some(cache) = self.means.cache.filter(|_| pairs.len() > cached)
+            && let Err(e) = cache.store(&key, set.view.resolution, &pairs)
+        {
+            // That costs time, not the run.
+            *trouble = Some(e.to_string());
+        }
+        if stopped {
+            return Err(Halt::Stopped);
+        }
+        pairs.truncate(used);
+        Ok((pairs, cached.min(used)))
+    }
+
+    fn converged(&self, method: usize, loaded: &mut dyn Loaded) -> Result<Truth, Halt> {
+        let set = self.set;
+        let (mut replicates, mut fault) = (Vec::new(), None);
+        for replicate in 0..CONVERGED_REPLICATES {
+            let frame = loaded.render(&Job {
+                view: &set.view,
+                camera: set.camera(),
+                estimator: set.plan.suite.methods[method].estimator.unsmoothed(),
+                ao: set.scene.ao,
+                rays: set.plan.suite.file.converged_rays.get() / CONVERGED_REPLICATES,
+                seed: set.plan.seed.wrapping_add(CONVERGED),
+                replicate,
+            });
+            let frame = frame.map_err(|e| Halt::Failed(e.to_string()))?;
+            let checked = super::faults::check_frame(&frame, set.regions(method), replicate);
+            fault = fault.or_else(|| checked.err().map(|e| e.to_string()));
+            replicates.push(frame.values);
+            self.may_go_on()?;
+        }
+        Ok(Truth { converged: Converged::new(replicates), fault })
+    }
+
+    fn case(
+        &self,
+        case: &Case,
+        replicates: u32,
+        known: Option<Images>,
+        loaded: &mut dyn Loaded,
+    ) -> Result<Images, Halt> {
+        let set = self.set;
+        let method = set.method(case);
+        let start = Instant::now();
+        let (mut images, mut seconds) = known.map_or_else(|| (Vec::new(), 0.0), |i| (i.replicates, i.seconds));
+        for replicate in images.len() as u32..replicates {
+            self.may_go_on()?;
+            if let Some(limit) = self.means.case_timeout
+                && start.elapsed() > limit
+            {
+                return Err(Halt::Failed(too_long(limit, replicate, replicates)));
+            }
+            let job = Job {
+                view: &set.view,
+                camera: set.camera(),
+                estimator: set.plan.suite.methods[method].estimator,
+                ao: set.scene.ao,
+                rays: case.rays,
+                seed: set.plan.seed,
+                replicate,
+            };
+            let failed = |e: RenderError| Halt::Failed(e.to_string());
+            let frame = loaded.render(&job).map_err(failed)?;
+            super::faults::check_frame(&frame, set.regions(method), replicate).map_err(failed)?;
+            images.push(frame.values);
+            seconds += frame.seconds;
+        }
+        let hash = pixel_hash(&moments(&images, set.view.pixels()).0);
+        Ok(Images { replicates: images, hash, seconds })
+    }
+
+    /// Pictures from the look view: every method, and the path tracer.
+    fn look(&self, cpu: &mut dyn Loaded) -> Result<Layers, Halt> {
+        let set = self.set;
+        let view = set.scene.look.view();
+        let rays = set.plan.suite.file.look_rays.get();
+        let seed = set.plan.seed.wrapping_add(LOOK);
+        let mut layers = Layers::new(view.resolution);
+        for method in set.plan.methods() {
+            let method = &set.plan.suite.methods[method];
+            let job = Job {
+                view: &view,
+                camera: None,
+                estimator: method.estimator,
+                ao: set.scene.ao,
+                rays,
+                seed,
+                replicate: 0,
+            };
+            let frame = cpu.render(&job).map_err(|e| Halt::Failed(e.to_string()))?;
+            layers = layers.with(&format!("openness-{}", method.name), frame.values);
+            self.may_go_on()?;
+        }
+        let gbuffer = GBuffer::new(&set.geometry.tracer, &view);
+        Ok(layers.with("path-traced", path::irradiance(&set.geometry, &gbuffer, rays, seed, 0)))
+    }
+
+    fn may_go_on(&self) -> Result<(), Halt> {
+        if self.means.stop.is_asked() { Err(Halt::Stopped) } else { Ok(()) }
+    }
+}
+
+impl Rendered {
+    /// The first so many replicates of a case.
+    pub fn replicates(&self, case: &Case, count: &dyn Fn(&Case) -> u32) -> Option<&[Vec<f32>]> {
+        let all = &self.images.get(&case.id())?.as_ref().ok()?.replicates;
+        all.get(..(count(case) as usize).min(all.len()))
+    }
+
+    /// Notes how long it took.
+    pub fn note(&mut self, scene: &str, timing: &mut Timing) {
+        for done in &self.done {
+            let end = done.unit.strip_prefix(scene).unwrap_or_default();
+            if end == "/judge" {
+                timing.judges.insert(scene.to_owned(), done.seconds);
+                timing.cached_replicates.insert(scene.to_owned(), done.cached);
+            } else if self.images.get(&done.unit).is_some_and(Result::is_ok) {
+                timing.cases.insert(done.unit.clone(), done.seconds);
+            }
+        }
+        timing.cache_trouble = timing.cache_trouble.take().or(self.cache_trouble.take());
+    }
+
+    fn take(&mut self, unit: &Unit<'_>, product: Result<Product, String>, done: Done, pixels: usize) {
+        self.done.retain(|d| d.unit != done.unit);
+        self.done.push(done);
+        match (unit, product) {
+            (Unit::Judge, Ok(Product::Judge(pairs, _))) => self.judge = Some(Ok(pairs)),
+            (Unit::Judge, Err(why)) => self.judge = Some(Err(why)),
+            (Unit::Converged(m), Ok(Product::Converged(truth))) => drop(self.truths.insert(*m, truth)),
+            (Unit::Converged(m), Err(why)) => {
+                let nothing = vec![vec![f32::NAN; pixels]; CONVERGED_REPLICATES as usize];
+                self.truths.insert(*m, Truth { converged: Converged::new(nothing), fault: Some(why) });
+            }
+            (Unit::Look, Ok(_)) => self.look = Some(Ok(())),
+            (Unit::Look, Err(why)) => self.look = Some(Err(why)),
+            (Unit::Case(case), Ok(Product::Case(images))) => drop(self.images.insert(case.id(), Ok(images))),
+            (Unit::Case(case), Err(why)) => drop(self.images.insert(case.id(), Err(why))),
+            // A unit gives its own kind of product.
+            _ => {}
+        }
+    }
+}
+
+/// Mean and variance of each pixel.
+fn moments(replicates: &[Vec<f32>], pixels: usize) -> (Vec<f32>, Vec<f32>) {
+    let of = |pixel: usize| {
+        let values: Vec<f64> = replicates.iter().map(|r| f64::from(r[pixel])).collect();
+        let (mean, variance) = mean_variance(&values);
+        (mean as f32, variance as f32)
+    };
+    (0..pixels).map(of).unzip()
+}
+
+fn too_long(limit: Duration, done: u32, of: u32) -> String {
+    format!(
+        "it took longer than {} s (--case-timeout): {done} of {of} replicates were done by then",
+        limit.as_secs_f64()
+    )
+}
+
+/// What a panic said.
+fn message(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|s| (*s).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "without a message".to_owned())
+}

@@ -1,0 +1,217 @@
+//! A part of a run, on a machine of its own.
+
+use super::{
+    Means, Prepared, RunError,
+    journal::{Done, Journal},
+    mine,
+    progress::Progress,
+    rendering::{Rendered, Studio},
+    timing,
+};
+use crate::{
+    disk::{DiskError, read_text, write_whole},
+    record::{Machine, RecordFolder, SHARD},
+    suite::Platform,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::{fmt, io::Write, path::Path, str::FromStr, time::Instant};
+
+/// Version of the format of `shard.json`.
+const VERSION: u32 = 1;
+
+/// Shards of one run, at most.
+const MOST: u32 = 65_536;
+
+/// Which of several parts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Shard {
+    /// From 1.
+    pub index: u32,
+    /// How many there are.
+    pub of: u32,
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text.split_once('/').and_then(|(k, n)| Some([k.parse().ok()?, n.parse().ok()?]));
+        match parts {
+            Some([index, of]) if (1..=MOST).contains(&of) && (1..=of).contains(&index) => Ok(Shard { index, of }),
+            _ => Err(format!("'{text}' is no shard: give K/N, K from 1 to N and N at most {MOST}, or auto")),
+        }
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.of)
+    }
+}
+
+impl Shard {
+    /// K and N as the environment of what runs the shards has them, with its name:
+    /// `AOGAUGE_SHARD=K/N`; GitLab's `parallel` (`CI_NODE_INDEX` from 1, `CI_NODE_TOTAL`); Slurm
+    /// arrays (`SLURM_ARRAY_TASK_ID` from `SLURM_ARRAY_TASK_MIN`, `SLURM_ARRAY_TASK_COUNT`); indexed
+    /// Jobs of Kubernetes (`JOB_COMPLETION_INDEX` from 0, and `JOB_COMPLETIONS`, which the Job must
+    /// set itself). GitHub's matrices set no variable of their own: the workflow hands
+    /// over `strategy.job-index` (from 0) and `strategy.job-total` as `MATRIX_INDEX` and `MATRIX_TOTAL`.
+    ///
+    /// # Errors
+    /// One sentence, where no such variables are set, only one of a pair is, or they are
+    /// no shard.
+    pub fn of_environment(get: &dyn Fn(&str) -> Option<String>) -> Result<(Shard, &'static str), String> {
+        if let Some(text) = get("AOGAUGE_SHARD") {
+            return Ok((text.parse().map_err(|e| format!("AOGAUGE_SHARD: {e}"))?, "AOGAUGE_SHARD"));
+        }
+        let pairs = [
+            ("GitLab", "CI_NODE_INDEX", "CI_NODE_TOTAL", "1"),
+            ("Slurm", "SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_COUNT", "SLURM_ARRAY_TASK_MIN"),
+            ("Kubernetes", "JOB_COMPLETION_INDEX", "JOB_COMPLETIONS", "0"),
+            ("GitHub Actions", "MATRIX_INDEX", "MATRIX_TOTAL", "0"),
+        ];
+        for (name, index, of, first) in pairs {
+            let (k, n) = match (get(index), get(of)) {
+                (None, None) => continue,
+                (Some(k), Some(n)) => (k, n),
+                (k, _) => {
+                    let [set, missing] = if k.is_some() { [index, of] } else { [of, index] };
+                    return Err(format!("{set} is set, but {missing} is not: {name} needs both to name a shard"));
+                }
+            };
+            let first = if first.len() == 1 { Some(first.to_owned()) } else { get(first) };
+            let number = |name: &str, text: &str| {
+                text.trim().parse::<u32>().map_err(|_| format!("{name} is '{text}', not a number of 0 or more"))
+            };
+            let first = first.map_or(Ok(0), |f| number("SLURM_ARRAY_TASK_MIN", &f))?;
+            let (k, n) = (number(index, &k)?, number(of, &n)?);
+            let at = k.checked_sub(first).map(|k| k + 1).filter(|k| *k <= n && n <= MOST);
+            let at = at.ok_or_else(|| {
+                format!(
+                    "{index} is {k} and {of} is {n}: the index must go from {first} in steps of 1, one for each shard"
+                )
+            })?;
+            return Ok((Shard { index: at, of: n }, name));
+        }
+        Err("no shard is named by the environment: give --shard K/N, or set AOGAUGE_SHARD".to_owned())
+    }
+}
+
+/// A part of a run on disk: `shard.json`, written last. Its images lie beside it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ShardRecord {
+    /// Version of this format.
+    pub version: u32,
+    /// Version of the tool that wrote it.
+    pub tool: String,
+    /// Which part.
+    pub shard: Shard,
+    /// What decides which images come of the run, hashed: equal in all its shards.
+    pub identity: String,
+    /// The suite, as it was asked for.
+    pub suite: String,
+    /// Seed of all randomness.
+    pub seed: u32,
+    /// What there was to render on.
+    pub platform: Platform,
+    /// What the names of cases had to contain.
+    pub filter: Option<String>,
+    /// Where it ran.
+    pub machine: Machine,
+    /// When it began, UTC.
+    pub began: String,
+    /// Wall clock, seconds.
+    pub seconds: f64,
+    /// CPU threads.
+    pub threads: usize,
+    /// Its units.
+    pub units: Vec<Done>,
+    /// Why it ended early.
+    pub incomplete: Option<String>,
+}
+
+impl ShardRecord {
+    /// Reads the shard in a folder.
+    ///
+    /// # Errors
+    /// Where there is none, it is malformed or of another version.
+    pub fn read(folder: &Path) -> Result<Self, DiskError> {
+        let path = folder.join(SHARD);
+        if !path.exists() {
+            return Err(DiskError::content(
+                folder,
+                format!("there is no {SHARD} here: not a shard, or it did not finish"),
+            ));
+        }
+        let text = read_text(&path)?;
+        #[derive(Deserialize)]
+        struct Versioned {
+            version: u32,
+        }
+        let malformed = |e: serde_json::Error| DiskError::content(&path, format!("not a shard: {e}"));
+        let Versioned { version } = serde_json::from_str(&text).map_err(malformed)?;
+        if version != VERSION {
+            let why = format!("it is a shard of version {version}, this tool reads version {VERSION}");
+            return Err(DiskError::content(&path, why));
+        }
+        serde_json::from_str(&text).map_err(malformed)
+    }
+}
+
+impl Prepared<'_> {
+    /// Renders a part of the plan and leaves it to be merged. `suite` is how the suite
+    /// was asked for.
+    ///
+    /// # Errors
+    /// As [`Prepared::run`].
+    pub fn run_shard(
+        &self,
+        shard: Shard,
+        suite: &str,
+        means: &Means<'_>,
+        folder: &RecordFolder,
+        observer: &dyn super::Observer,
+    ) -> Result<ShardRecord, RunError> {
+        let start = Instant::now();
+        let timing = timing();
+        let progress = Progress::new(observer, self.cost(Some(shard)));
+        let journal = Journal { folder };
+        let mut units = Vec::new();
+        for set in &self.sets {
+            let studio = Studio { set, means, journal, progress: &progress };
+            let mut rendered = Rendered::default();
+            studio.render(&mine(set, Some(shard)), self.plan.suite.file.replicates.get(), &mut rendered)?;
+            let failed = rendered.done.iter().any(|d| d.error.is_some());
+            units.extend(rendered.done);
+            if failed && means.fail_fast {
+                means.stop.ask();
+            }
+        }
+        units.sort_by(|a, b| a.unit.cmp(&b.unit));
+        let missing = self.steps(Some(shard)).len() - units.len();
+        let record = ShardRecord {
+            version: VERSION,
+            tool: env!("CARGO_PKG_VERSION").to_owned(),
+            shard,
+            identity: self.identity(&means.machine),
+            suite: suite.to_owned(),
+            seed: self.plan.seed,
+            platform: self.plan.platform,
+            filter: self.plan.filter.clone(),
+            machine: means.machine.clone(),
+            began: timing.began,
+            seconds: start.elapsed().as_secs_f64(),
+            threads: timing.threads,
+            units,
+            incomplete: (missing > 0).then(|| format!("it ended early: {missing} units are not rendered")),
+        };
+        let path = folder.path().join(SHARD);
+        let text = serde_json::to_string_pretty(&record)
+            .map_err(|e| DiskError::content(&path, format!("the shard cannot be written: {e}")))?;
+        write_whole(&path, |buffer| buffer.write_all(format!("{text}\n").as_bytes()))?;
+        Ok(record)
+    }
+}
