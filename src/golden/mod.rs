@@ -26,7 +26,7 @@ mod wording;
 
 pub use approve::{Approval, named_by_record};
 pub use artifact::Candidates;
-pub use assert::{GoldenError, Goldens, Held, assert_golden, check_golden};
+pub use assert::{CI_VARIABLES, GoldenError, Goldens, Held, assert_golden, check_golden};
 pub use change::Change;
 pub use compare::{Comparison, MUST_SEE, Method, Moved, RegionShift, Seen, Terms, compare};
 pub use file::{Golden, Identity, Provenance};
