@@ -77,7 +77,7 @@ pub enum Outcome {
 /// What came of a record.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Verification {
-    /// Version of this format, [`VERSION`].
+    /// Version of this format.
     pub version: u32,
     /// The family error over all cases.
     pub alpha: f64,
