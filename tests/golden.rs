@@ -423,7 +423,9 @@ fn what_is_printed_has_a_version_and_a_schema() {
         let schema: Value = serde_json::from_str(&stdout(&["schema", &format!("golden-{}", verb[0])])).unwrap();
         assert_eq!(keys(&schema["properties"]), keys(&printed), "{verb:?}");
         let parts = match verb[0] {
-            "verify" => vec![("Checked", &printed["cases"][0])],
+            "verify" => {
+                vec![("Checked", &printed["cases"][0]), ("Comparison", &printed["cases"][0]["verdict"]["compared"])]
+            }
             "list" => vec![("Entry", &printed["goldens"][0]), ("About", &printed["goldens"][0]["golden"]["Ok"])],
             _ => vec![],
         };

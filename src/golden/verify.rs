@@ -34,7 +34,7 @@ pub enum Verdict {
     /// The case ended with an error, or the record's own image cannot be read.
     Lost(String),
     /// Golden and image were compared.
-    Compared(#[schemars(with = "serde_json::Map<String, serde_json::Value>")] Box<Comparison>),
+    Compared(Box<Comparison>),
 }
 
 /// A golden and what came of it.
