@@ -561,7 +561,7 @@ fn without_an_adapter_the_doctor_says_what_to_install() {
 
 #[test]
 fn every_verb_shows_an_example() {
-    let verbs: [&[&str]; 13] = [
+    let verbs: [&[&str]; 14] = [
         &[],
         &["run"],
         &["report"],
@@ -569,6 +569,7 @@ fn every_verb_shows_an_example() {
         &["golden", "verify"],
         &["golden", "list"],
         &["golden", "prune"],
+        &["golden", "remove"],
         &["golden", "size"],
         &["scene", "list"],
         &["scene", "show"],

@@ -246,6 +246,7 @@ fn goldens_are_listed_sized_and_pruned() {
     assert!(list.contains("größer") && list.contains("8 x 4") && list.contains("cpu on "), "{list}");
     let all: Value =
         serde_json::from_str(&stdout(&["golden", "list", "--goldens", text(&goldens), "--format", "json"])).unwrap();
+    let all = &all["goldens"];
     assert_eq!(all.as_array().unwrap().len(), 3);
     assert_eq!(all[1]["name"], "b");
     assert_eq!(all[0]["golden"]["Ok"]["seed"], 1);
@@ -267,14 +268,9 @@ fn goldens_are_listed_sized_and_pruned() {
     fs::copy(goldens.join("scene/denoised.4.exr"), goldens.join("gone/classic.4.exr")).unwrap();
     fs::copy(goldens.join("scene/denoised.4.exr"), goldens.join("scene/denoised.8.exr")).unwrap();
     fs::write(goldens.join("README.md"), "not a golden").unwrap();
-    let partial = dir.path().join("partial");
-    copied(&RUNS.out[0], &partial);
-    edited(&partial, |r| r["cases"].as_array_mut().unwrap().truncate(1));
-    assert!(golden(5, &["prune", text(&partial)]).contains("no case of estimator 'denoised'"));
-    edited(&partial, |r| r["cases"][0]["error"] = json!("lost"));
-    assert!(golden(5, &["prune", text(&partial)]).contains("ended with an error"));
-    for named_by in [suite, out] {
-        assert!(golden(0, &["prune", named_by, "--dry-run"]).contains("2 goldens would be removed"));
+    for (named_by, code) in [(&[suite][..], 0), (&[suite, out], 0), (&[out], 5)] {
+        let stderr = golden(code, &[&["prune"], named_by, &["--dry-run"]].concat());
+        assert!(stderr.contains(if code == 0 { "2 goldens would be removed" } else { "give it too" }), "{stderr}");
     }
     assert!(goldens.join("gone/classic.4.exr").exists());
     let removed = stdout(&["golden", "prune", suite, "--goldens", text(&goldens)]);
@@ -282,6 +278,161 @@ fn goldens_are_listed_sized_and_pruned() {
     assert!(!goldens.join("gone").exists() && goldens.join("README.md").exists());
     assert!(golden(0, &["prune", suite]).contains("0 goldens removed"));
     assert!(goldens.join("scene/classic.4.b.exr").exists(), "others of a case stay");
+}
+
+/// A record that names a scene, an estimator or a ray count less than its suite, in
+/// whatever way that came about, removes nothing.
+#[test]
+fn a_record_of_less_than_its_suite_prunes_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let (goldens, partial) = (dir.path().join("goldens"), dir.path().join("partial"));
+    let prune = |code: i32, more: &[&str]| {
+        expect(code, &[&["golden", "prune", text(&partial), "--goldens", text(&goldens)], more].concat())
+    };
+    let suite = text(&RUNS.suite);
+    expect(0, &["golden", "approve", text(&RUNS.out[0]), "--goldens", text(&goldens), "--reason", "r"]);
+    type Edit = fn(&mut Value);
+    let edits: [(Edit, &str); 6] = [
+        (|r| r["cases"].as_array_mut().unwrap().truncate(1), "no golden case of estimator 'denoised'"),
+        (|r| r["cases"][0]["error"] = json!("lost"), "scene/classic/cpu/4 ended with an error"),
+        // A suite cut before the run: what is left fits together.
+        (
+            |r| {
+                r["cases"].as_array_mut().unwrap().truncate(1);
+                r["suite"]["estimators"] = json!(["classic"]);
+            },
+            "no golden case of estimator 'denoised' in scene 'scene' at 4 rays, which its suite 'suite' names",
+        ),
+        (
+            |r| {
+                r["scenes"][0]["name"] = json!("other");
+                for case in r["cases"].as_array_mut().unwrap() {
+                    case["case"]["scene"] = json!("other");
+                }
+            },
+            "in scene 'scene' at 4 rays",
+        ),
+        (|r| r["suite"]["golden_rays"] = json!(8), "in scene 'scene' at 4 rays"),
+        (|r| r["suite"]["golden_rays"] = json!(null), "in scene 'scene' at 4 rays"),
+    ];
+    for (edit, says) in edits {
+        copied(&RUNS.out[0], &partial);
+        edited(&partial, edit);
+        let stderr = prune(5, &[suite]);
+        assert!(stderr.contains(says) && stderr.contains("nothing is removed"), "{says}: {stderr}");
+    }
+    // By its name it is of a built-in suite, which names much else.
+    copied(&RUNS.out[0], &partial);
+    edited(&partial, |r| r["suite"]["name"] = json!("thin-occluders"));
+    assert!(prune(5, &[]).contains("which its suite 'thin-occluders' names"));
+    assert!(prune(5, &[suite]).contains("which its suite 'thin-occluders' names"));
+    assert_eq!(reasons(&goldens, 2).len(), 1, "all are there still");
+
+    // The whole record names its cases, as a folder and as an archive of CI.
+    copied(&RUNS.out[0], &partial);
+    fs::create_dir(goldens.join("gone")).unwrap();
+    fs::copy(goldens.join("scene/classic.4.exr"), goldens.join("gone/classic.4.exr")).unwrap();
+    assert!(prune(0, &[suite, "--dry-run"]).contains("1 goldens would be removed; 2 cases"));
+    let zip = dir.path().join("a.zip");
+    zipped(&RUNS.out[0], &zip, "artifact/");
+    let args = ["golden", "prune", text(&zip), "--goldens", text(&goldens)];
+    assert!(expect(5, &args).contains("give it too"));
+    assert!(expect(0, &[&args[..], &[suite]].concat()).contains("1 goldens removed; 2 cases"));
+    fs::write(&zip, "PK, but no archive").unwrap();
+    assert!(expect(2, &args).contains("zip file"));
+    let nowhere = dir.path().join("nowhere");
+    expect(0, &["golden", "prune", suite, "--goldens", text(&nowhere)]);
+    assert!(!nowhere.exists());
+}
+
+#[test]
+fn goldens_are_removed_by_name_all_or_none() {
+    let dir = tempfile::tempdir().unwrap();
+    let goldens = dir.path().join("goldens");
+    let golden = |code: i32, args: &[&str]| expect(code, &[&["golden"], args, &["--goldens", text(&goldens)]].concat());
+    for name in ["old-device", "third"] {
+        golden(0, &["approve", text(&RUNS.out[0]), "--reason", "r", "--as", name]);
+    }
+    golden(0, &["approve", text(&RUNS.out[0]), "--reason", "r"]);
+    let stderr = golden(3, &["remove", "scene/classic.4.third", "scene/classic.4.fourth"]);
+    assert!(stderr.contains("1 of 2 goldens do not exist") && stderr.contains("classic.4.fourth.exr"), "{stderr}");
+    let stray = dir.path().join("elsewhere/scene");
+    fs::create_dir_all(&stray).unwrap();
+    let stray = stray.join("classic.4.exr");
+    for bad in ["classic.4", "scene/classic", "../scene/classic.4", "scene/..", text(&stray), "README.md"] {
+        let stderr = golden(2, &["remove", bad]);
+        assert!(stderr.contains("SCENE/ESTIMATOR.RAYS"), "{bad}: {stderr}");
+    }
+    assert_eq!(reasons(&goldens, 6).len(), 1);
+    golden(0, &["remove", "scene/classic.4.third", "scene/denoised.4.third.exr"]);
+    let files = ["classic", "denoised"].map(|e| goldens.join(format!("scene/{e}.4.old-device.exr")));
+    assert!(golden(0, &["remove", text(&files[0]), text(&files[1])]).contains("2 goldens removed"));
+    assert_eq!(reasons(&goldens, 2).len(), 1);
+    assert!(goldens.join("scene/classic.4.exr").exists() && !goldens.join(".approval/journal.json").exists());
+    assert!(golden(3, &["remove", text(&files[0])]).contains("nothing is removed"));
+    let nowhere = dir.path().join("nowhere");
+    expect(3, &["golden", "remove", "a/b.4", "--goldens", text(&nowhere)]);
+    assert!(!nowhere.exists());
+}
+
+#[test]
+fn a_lost_case_refuses_the_approval_and_growth_is_told() {
+    let dir = tempfile::tempdir().unwrap();
+    let (goldens, partial) = (dir.path().join("goldens"), dir.path().join("partial"));
+    copied(&RUNS.out[0], &partial);
+    edited(&partial, |r| {
+        r["cases"][1]["error"] = json!("the device was lost");
+        r["cases"][1]["image"] = json!(null);
+    });
+    let approve = |code: i32, more: &[&str]| {
+        let base = ["golden", "approve", text(&partial), "--goldens", text(&goldens), "--reason", "r"];
+        expect(code, &[&base[..], more].concat())
+    };
+    for more in [&[][..], &["--only", "denoised"]] {
+        let stderr = approve(5, more);
+        assert!(stderr.contains("scene/denoised/cpu/4 (the device was lost)"), "{stderr}");
+        assert!(stderr.contains("nothing is approved"), "{stderr}");
+    }
+    assert!(!goldens.exists());
+    let stderr = approve(0, &["--only", "classic"]);
+    assert!(stderr.contains("1 goldens approved") && stderr.contains("kB more than before"), "{stderr}");
+    assert!(approve(0, &["--only", "classic"]).contains(" 0 B more than before"));
+    assert!(!stderr.contains("every clone carries them"), "{stderr}");
+    // 60 MB that hold nothing.
+    File::create(goldens.join("scene/denoised.4.exr")).unwrap().set_len(60_000_000).unwrap();
+    let stderr = approve(0, &["--only", "classic"]);
+    assert!(stderr.contains("more than 50.0 MB: every clone carries them"), "{stderr}");
+    copied(&RUNS.out[0], &partial);
+    let stderr = approve(0, &[]);
+    assert!(stderr.contains("MB less than before") && !stderr.contains("every clone"), "{stderr}");
+}
+
+/// Every key that is printed stands in the schema, and what the schema requires is
+/// printed.
+#[test]
+fn what_is_printed_has_a_version_and_a_schema() {
+    let dir = tempfile::tempdir().unwrap();
+    let goldens = dir.path().join("goldens");
+    expect(0, &["golden", "approve", text(&RUNS.out[0]), "--goldens", text(&goldens), "--reason", "r"]);
+    let (out, goldens) = (text(&RUNS.out[1]), text(&goldens));
+    let keys = |of: &Value| of.as_object().unwrap().keys().cloned().collect::<BTreeSet<String>>();
+    for verb in [&["verify", out][..], &["list"], &["size"]] {
+        let args = [&["golden"], verb, &["--goldens", goldens, "--format", "json"]].concat();
+        let printed: Value = serde_json::from_str(&stdout(&args)).unwrap();
+        assert_eq!(printed["version"], 1, "{verb:?}");
+        let schema: Value = serde_json::from_str(&stdout(&["schema", &format!("golden-{}", verb[0])])).unwrap();
+        assert_eq!(keys(&schema["properties"]), keys(&printed), "{verb:?}");
+        let parts = match verb[0] {
+            "verify" => {
+                vec![("Checked", &printed["cases"][0]), ("Comparison", &printed["cases"][0]["verdict"]["compared"])]
+            }
+            "list" => vec![("Entry", &printed["goldens"][0]), ("About", &printed["goldens"][0]["golden"]["Ok"])],
+            _ => vec![],
+        };
+        for (name, part) in parts {
+            assert_eq!(keys(&schema["$defs"][name]["properties"]), keys(part), "{name}");
+        }
+    }
 }
 
 #[test]
@@ -401,6 +552,7 @@ fn archives_of_ci_are_candidates_and_cannot_harm() {
 fn reasons(goldens: &Path, n: usize) -> BTreeSet<String> {
     let list = stdout(&["golden", "list", "--goldens", text(goldens), "--format", "json"]);
     let list: Value = serde_json::from_str(&list).unwrap();
+    let list = &list["goldens"];
     assert_eq!(list.as_array().unwrap().len(), n);
     list.as_array().unwrap().iter().map(|e| e["golden"]["Ok"]["reason"].as_str().unwrap().to_owned()).collect()
 }

@@ -20,7 +20,7 @@ fn assertions_obey_the_environment() {
     let assertion = |red: &str, more: &[(&str, &str)]| {
         let mut command = Command::new(std::env::current_exe().unwrap());
         command.args(["--ignored", "--exact", "somebodys_assertion", "--nocapture"]);
-        for name in ["CI", "GITHUB_ACTIONS", "GITLAB_CI", "JENKINS_URL", "TEAMCITY_VERSION", "TF_BUILD", "BUILDKITE"] {
+        for name in aogauge::golden::CI_VARIABLES.iter().chain(&["AOGAUGE_BLESS"]) {
             command.env_remove(name);
         }
         command.env("RED", red).env("AOGAUGE_GOLDENS", &goldens).env("AOGAUGE_FAILURES", &failures);
@@ -31,15 +31,32 @@ fn assertions_obey_the_environment() {
     for (more, says) in [
         (&[][..], "run the test with AOGAUGE_BLESS=1 and commit"),
         (&[("AOGAUGE_BLESS", "0")], "run the test with AOGAUGE_BLESS=1 and commit"),
+        (&[("AOGAUGE_BLESS", "False")], "run the test with AOGAUGE_BLESS=1 and commit"),
+        (&[("AOGAUGE_BLESS", "")], "run the test with AOGAUGE_BLESS=1 and commit"),
+        (&[("AOGAUGE_BLESS", "on")], "AOGAUGE_BLESS is 'on': give 1, true or yes"),
+        (&[("AOGAUGE_BLESS", "true"), ("CI", "true")], "AOGAUGE_BLESS is set, but so is CI"),
         (&[bless, ("CI", "true")], "AOGAUGE_BLESS is set, but so is CI"),
         (&[bless, ("GITLAB_CI", "1")], "so is GITLAB_CI"),
     ] {
         let (passed, stderr) = assertion("9", more);
-        assert!(!passed && stderr.contains(says) && stderr.contains("tests/golden_assert.rs"), "{more:?}: {stderr}");
+        assert!(!passed && stderr.contains(says), "{more:?}: {stderr}");
+        assert!(stderr.contains("tests/golden_assert.rs"), "{more:?}: {stderr}");
         assert!(!goldens.exists(), "{more:?}");
     }
     assert!(assertion("9", &[bless, ("CI", "false")]).0);
     assert!(assertion("9", &[("CI", "true")]).0);
+    for on in ["true", "YES"] {
+        std::fs::write(goldens.join("somebodys.png"), "broken").unwrap();
+        let (passed, stderr) = assertion("9", &[("AOGAUGE_BLESS", on)]);
+        assert!(passed && stderr.contains("somebodys.png"), "{stderr}");
+        assert!(stderr.contains("what could not be read is replaced"), "{stderr}");
+    }
+    assert!(assertion("9", &[]).0);
+    std::fs::write(goldens.join("somebodys.png"), "version https://git-lfs.github.com/spec/v1\n").unwrap();
+    let (passed, stderr) = assertion("9", &[bless]);
+    assert!(!passed && stderr.contains("git lfs pull"), "{stderr}");
+    std::fs::remove_file(goldens.join("somebodys.png")).unwrap();
+    assert!(assertion("9", &[bless]).0);
     let (passed, stderr) = assertion("10", &[]);
     assert!(!passed && stderr.contains("64 of 64 pixels differ"), "{stderr}");
     assert!(failures.join("somebodys.difference.png").exists());

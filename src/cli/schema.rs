@@ -1,7 +1,10 @@
 //! `aogauge schema`
 
-use super::{Exit, Failure, json, print};
-use crate::{bench::GpuBench, compare::Comparison, flatland::Study, record::Record, scenes::Scene, suite::SuiteFile};
+use super::{Exit, Failure, golden, json, print};
+use crate::{
+    bench::GpuBench, compare::Comparison, flatland::Study, golden::Verification, record::Record, scenes::Scene,
+    suite::SuiteFile,
+};
 use clap::ValueEnum;
 
 /// Print the JSON Schema of a format.
@@ -28,6 +31,12 @@ enum Of {
     Bench,
     /// What `compare --format json` prints.
     Compare,
+    /// What `golden verify --format json` prints.
+    GoldenVerify,
+    /// What `golden list --format json` prints.
+    GoldenList,
+    /// What `golden size --format json` prints.
+    GoldenSize,
 }
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
@@ -37,6 +46,9 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
         Of::Scene => Scene::file_schema(),
         Of::Flatland => schemars::schema_for!(Study),
         Of::Compare => schemars::schema_for!(Comparison),
+        Of::GoldenVerify => schemars::schema_for!(Verification),
+        Of::GoldenList => schemars::schema_for!(golden::Listing),
+        Of::GoldenSize => schemars::schema_for!(golden::Sizes),
         Of::Bench => schemars::schema_for!(GpuBench),
     };
     print(&json(&schema)?)?;

@@ -1,5 +1,4 @@
-//! Accepting images of a record as goldens, and removing goldens of cases that are no
-//! more.
+//! Accepting images of a record as goldens.
 
 use super::{Golden, Identity, Limits, Provenance, Sampled, Slot, Store, file::regions, store::golden_cases};
 use crate::{
@@ -9,7 +8,7 @@ use crate::{
 };
 use rayon::prelude::*;
 use std::{
-    collections::BTreeSet,
+    fs,
     path::{Path, PathBuf},
 };
 
@@ -29,6 +28,39 @@ pub struct Approval<'a> {
     pub limits: Option<Limits>,
 }
 
+/// What an approval did to the store.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Approved {
+    /// The goldens written; none where the record has no such case.
+    pub files: Vec<PathBuf>,
+    /// Bytes of all goldens before.
+    pub before: u64,
+    /// Bytes of all goldens after.
+    pub after: u64,
+}
+
+/// Why nothing was approved.
+#[derive(Debug, thiserror::Error)]
+pub enum ApproveError {
+    /// Selected cases ended with an error: they have no image to accept.
+    #[error("{} of {selected} selected cases were lost, so nothing is approved: {}", lost.len(), first(lost))]
+    Lost {
+        /// How many cases were selected.
+        selected: usize,
+        /// The lost ones, each with its error.
+        lost: Vec<String>,
+    },
+    /// A file cannot be read or written, or is not what it should be.
+    #[error(transparent)]
+    Disk(#[from] DiskError),
+}
+
+/// The first few of many.
+fn first(all: &[String]) -> String {
+    let more = if all.len() > 8 { "; ..." } else { "" };
+    all.iter().take(8).map(String::as_str).collect::<Vec<_>>().join("; ") + more
+}
+
 /// What an estimator computes, as text: part of a golden's identity.
 pub(super) fn definition(record: &Record, estimator: &str) -> String {
     record.suite.methods.get(estimator).map_or_else(String::new, |m| serde_json::json!(m).to_string())
@@ -43,25 +75,26 @@ pub(super) fn sampled(folder: &Path, record: &Record, case: &CaseRecord) -> Resu
 }
 
 impl Store {
-    /// Accepts images of a record as goldens. Returns the files written; none where the
-    /// record has no such case. The store has all of them or none of them. `waiting` as
-    /// in [`Store::change`].
+    /// Accepts images of a record as goldens: all that are selected, or none. `waiting`
+    /// as in [`Store::change`].
     ///
     /// # Errors
-    /// Where an image of the record cannot be read, limits are given for an image with
-    /// noise, or the store cannot be written.
+    /// Where a selected case ended with an error, an image of the record cannot be read,
+    /// limits are given for an image with noise, or the store cannot be written.
     pub fn approve(
         &self,
         folder: &Path,
         record: &Record,
         approval: &Approval<'_>,
         waiting: &dyn Fn(),
-    ) -> Result<Vec<PathBuf>, DiskError> {
-        let cases: Vec<&CaseRecord> = golden_cases(record)
-            .filter(|c| {
-                c.case.renderer == approval.renderer && c.error.is_none() && c.case.id().contains(approval.only)
-            })
-            .collect();
+    ) -> Result<Approved, ApproveError> {
+        let selected = |c: &&CaseRecord| c.case.renderer == approval.renderer && c.case.id().contains(approval.only);
+        let cases: Vec<&CaseRecord> = golden_cases(record).filter(selected).collect();
+        let told = |c: &&CaseRecord| Some(format!("{} ({})", c.case.id(), c.error.as_deref()?));
+        let lost: Vec<String> = cases.iter().filter_map(told).collect();
+        if !lost.is_empty() {
+            return Err(ApproveError::Lost { selected: cases.len(), lost });
+        }
         let ready: Vec<(Slot, Layers)> = cases
             .par_iter()
             .map(|case| {
@@ -71,58 +104,18 @@ impl Store {
             })
             .collect::<Result<_, DiskError>>()?;
         if ready.is_empty() {
-            return Ok(Vec::new());
+            return Ok(Approved::default());
         }
         let mut change = self.change(waiting)?;
+        let size = |path: &Path| fs::metadata(path).map_or(0, |m| m.len());
+        let before: u64 = self.snapshot()?.files.values().map(|path| size(path)).sum();
+        let mut after = before;
         for (slot, layers) in &ready {
-            change.put(&slot.path(), layers)?;
+            after = (after + change.put(&slot.path(), layers)?).saturating_sub(size(&self.path(slot)));
         }
         change.commit()?;
-        Ok(ready.iter().map(|(slot, _)| self.path(slot)).collect())
+        Ok(Approved { files: ready.iter().map(|(slot, _)| self.path(slot)).collect(), before, after })
     }
-
-    /// The goldens of cases that `named` does not hold.
-    ///
-    /// # Errors
-    /// Where the store cannot be listed.
-    pub fn orphans(&self, named: &BTreeSet<Slot>) -> Result<Vec<Slot>, DiskError> {
-        let is_named = |slot: &Slot| named.contains(&Slot { name: None, ..slot.clone() });
-        self.reading(|snapshot| snapshot.files.keys().filter(|s| !is_named(s)).cloned().collect())
-    }
-
-    /// Removes goldens, all of them or none.
-    ///
-    /// # Errors
-    /// Where the store cannot be written.
-    pub fn remove(&self, slots: &[Slot], waiting: &dyn Fn()) -> Result<(), DiskError> {
-        let mut change = self.change(waiting)?;
-        for slot in slots {
-            change.remove(&slot.path());
-        }
-        change.commit()
-    }
-}
-
-/// The slots of a record's golden cases.
-///
-/// # Errors
-/// One sentence, where the record may lack cases of its suite: one ended with an error,
-/// or a scene lacks an estimator.
-pub fn named_by_record(record: &Record) -> Result<BTreeSet<Slot>, String> {
-    if let Some(lost) = record.cases.iter().find(|c| c.error.is_some()) {
-        return Err(format!("the case {} ended with an error: run the suite again", lost.case.id()));
-    }
-    for scene in &record.scenes {
-        for estimator in &record.suite.estimators {
-            if !record.cases.iter().any(|c| c.case.scene == scene.name && c.case.estimator == *estimator) {
-                return Err(format!(
-                    "the record has no case of estimator '{estimator}' in scene '{}': give one of the whole suite",
-                    scene.name
-                ));
-            }
-        }
-    }
-    Ok(golden_cases(record).map(Slot::of).collect())
 }
 
 fn golden_of(folder: &Path, record: &Record, case: &CaseRecord, approval: &Approval<'_>) -> Result<Golden, DiskError> {

@@ -52,6 +52,13 @@ impl Candidates {
         Ok(Candidates { folder: unpacked.path().to_owned(), _unpacked: Some(unpacked) })
     }
 
+    /// Whether this is a folder or begins as a zip file does: a record, if it is anything
+    /// here, and no suite file.
+    pub fn is_one(path: &Path) -> bool {
+        let mut begin = [0; 2];
+        path.is_dir() || File::open(path).and_then(|mut f| f.read_exact(&mut begin)).is_ok() && begin == *b"PK"
+    }
+
     /// The record's folder.
     pub fn folder(&self) -> &Path {
         &self.folder

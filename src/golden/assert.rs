@@ -4,15 +4,17 @@ use super::{Picture, Tolerance};
 use crate::{disk::DiskError, layers::write_png, scenes::check_name};
 use std::{
     env, fs,
+    io::{self, Read, Write},
     path::{Path, PathBuf},
 };
 
-/// Accepts images in place of comparing them, where it is `1`.
+/// Accepts images in place of comparing them, where it is `1`, `true` or `yes`.
 const BLESS: &str = "AOGAUGE_BLESS";
 
-/// What CI services set. GitHub, GitLab, CircleCI, Travis, AppVeyor and others set the
+/// What CI services set: where one of these is set, and neither `false` nor `0`, no
+/// image is accepted. GitHub, GitLab, CircleCI, Travis, AppVeyor and others set the
 /// first.
-const CI: [&str; 10] = [
+pub const CI_VARIABLES: [&str; 10] = [
     "CI",
     "GITHUB_ACTIONS",
     "GITLAB_CI",
@@ -45,6 +47,13 @@ pub enum Held {
     Held,
     /// It was accepted, and its golden written to this file.
     Blessed(PathBuf),
+    /// It was accepted in place of a golden that could not be read.
+    Replaced {
+        /// The golden's file.
+        file: PathBuf,
+        /// Why the one before could not be read.
+        why: String,
+    },
 }
 
 /// Why an image may not stand.
@@ -53,6 +62,9 @@ pub enum GoldenError {
     /// The name cannot be a file's.
     #[error("golden: {0}")]
     Name(String),
+    /// The variable that accepts images has a value of no meaning.
+    #[error("{BLESS} is '{0}': give 1, true or yes to accept images, or 0, false, no or nothing to compare them")]
+    Bless(String),
     /// There is no golden, and none is written unasked.
     #[error(
         "golden '{name}': there is no {file}. Look at {test}; if it is right, run the test with {BLESS}=1 and commit the file", file = file.display(), test = test.display()
@@ -119,12 +131,16 @@ fn listed(files: &[(&'static str, PathBuf)]) -> String {
 /// Where [`check_golden`] is an error, with its message.
 #[track_caller]
 pub fn assert_golden(name: &str, picture: impl Into<Picture>, tolerance: impl Into<Tolerance>) {
-    if let Err(e) = check_golden(name, picture, tolerance) {
+    match check_golden(name, picture, tolerance) {
+        Ok(Held::Held | Held::Blessed(_)) => {}
+        // Not by `eprintln!`: of tests that pass, what that prints is not shown. Where
+        // standard error is closed, nobody reads it.
+        Ok(Held::Replaced { why, .. }) => {
+            let _ = writeln!(io::stderr(), "golden '{name}': what could not be read is replaced: {why}");
+        }
         // An assertion is there to panic.
         #[allow(clippy::panic)]
-        {
-            panic!("{e}");
-        }
+        Err(e) => panic!("{e}"),
     }
 }
 
@@ -132,8 +148,9 @@ pub fn assert_golden(name: &str, picture: impl Into<Picture>, tolerance: impl In
 /// package under test, or `NAME.exr` for floats and samples.
 ///
 /// With `AOGAUGE_BLESS=1` the image is accepted: its golden is written where the image
-/// may not stand for the one there is. On CI that is refused. Nothing else writes a
-/// golden. A failure leaves the image, the golden and a picture of the difference in
+/// may not stand for the one there is, or that one cannot be read. On CI that is
+/// refused, and so is it in place of a Git LFS pointer: whether the golden it stands for
+/// still holds nobody knows. Nothing else writes a golden. A failure leaves the image, the golden and a picture of the difference in
 /// the target folder, `golden-failures/NAME.*`.
 ///
 /// `AOGAUGE_GOLDENS` names another folder of goldens, `AOGAUGE_FAILURES` another for
@@ -146,20 +163,23 @@ pub fn check_golden(
     picture: impl Into<Picture>,
     tolerance: impl Into<Tolerance>,
 ) -> Result<Held, GoldenError> {
-    Goldens::of_package().check(name, &picture.into(), &tolerance.into())
+    Goldens::of_package()?.check(name, &picture.into(), &tolerance.into())
 }
 
 impl Goldens {
     /// By the environment that `cargo test` gives.
-    pub fn of_package() -> Self {
+    ///
+    /// # Errors
+    /// [`GoldenError::Bless`].
+    pub fn of_package() -> Result<Self, GoldenError> {
         let set = |name: &str| env::var_os(name).filter(|v| !v.is_empty());
         let package = set("CARGO_MANIFEST_DIR").map_or_else(PathBuf::new, PathBuf::from);
-        Goldens {
+        Ok(Goldens {
             folder: set("AOGAUGE_GOLDENS").map_or_else(|| package.join("tests").join("goldens"), PathBuf::from),
             failures: set("AOGAUGE_FAILURES").map_or_else(|| target().join("golden-failures"), PathBuf::from),
-            bless: set(BLESS).is_some_and(|v| v == "1"),
-            ci: CI.into_iter().find(|name| set(name).is_some_and(|v| v != "false" && v != "0")),
-        }
+            bless: is_on(&set(BLESS).unwrap_or_default().to_string_lossy())?,
+            ci: CI_VARIABLES.into_iter().find(|name| set(name).is_some_and(|v| v != "false" && v != "0")),
+        })
     }
 
     /// As [`check_golden`], in these folders.
@@ -183,10 +203,10 @@ impl Goldens {
         }
         let golden = match picture.read_alike(&file) {
             Ok(golden) => golden,
-            // What cannot be read can be replaced, where that is asked for.
-            Err(_) if self.bless => {
+            // What is broken can be replaced, where that is asked for.
+            Err(e) if self.bless && !is_pointer(&file) => {
                 picture.write(&file).map_err(disk)?;
-                return Ok(Held::Blessed(file));
+                return Ok(Held::Replaced { file, why: e.to_string() });
             }
             Err(e) => return Err(disk(e)),
         };
@@ -218,6 +238,22 @@ impl Goldens {
         }
         Ok(path)
     }
+}
+
+/// Reads [`BLESS`].
+fn is_on(value: &str) -> Result<bool, GoldenError> {
+    match value.to_ascii_lowercase().as_str() {
+        "1" | "true" | "yes" => Ok(true),
+        "" | "0" | "false" | "no" => Ok(false),
+        _ => Err(GoldenError::Bless(value.to_owned())),
+    }
+}
+
+/// Whether Git LFS has left a pointer in a file's place.
+fn is_pointer(path: &Path) -> bool {
+    const BEGIN: &[u8] = b"version https://git-lfs";
+    let mut begin = [0; BEGIN.len()];
+    fs::File::open(path).and_then(|mut f| f.read_exact(&mut begin)).is_ok() && begin == BEGIN
 }
 
 /// The folder that Cargo builds in: tests lie in its `deps`.
@@ -279,6 +315,14 @@ mod tests {
         fs::write(&file, "version https://git-lfs.github.com/spec/v1\n").unwrap();
         let error = plain.check("a", &picture(90), &Tolerance::Exact).unwrap_err().to_string();
         assert!(error.contains("git lfs pull"), "{error}");
+        let error = bless.check("a", &picture(90), &Tolerance::Exact).unwrap_err().to_string();
+        assert!(error.contains("git lfs pull"), "{error}");
+        assert!(fs::read(&file).unwrap().starts_with(b"version"), "the pointer stays");
+        fs::write(&file, "broken").unwrap();
+        assert!(plain.check("a", &picture(90), &Tolerance::Exact).is_err());
+        let Held::Replaced { why, .. } = bless.check("a", &picture(90), &Tolerance::Exact).unwrap() else { panic!() };
+        assert!(why.contains("a.png"), "{why}");
+        assert_eq!(plain.check("a", &picture(90), &Tolerance::Exact).unwrap(), Held::Held);
         for bad in ["", "../a", "a/b"] {
             assert!(matches!(bless.check(bad, &picture(0), &Tolerance::Exact), Err(GoldenError::Name(_))));
         }

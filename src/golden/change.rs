@@ -185,15 +185,18 @@ impl Change {
         Ok(Change { store: store.to_owned(), journal: Journal::default(), _lock: lock })
     }
 
-    /// Writes a golden, to be moved to `to`, `SCENE/FILE` in the store.
+    /// Writes a golden, to be moved to `to`, `SCENE/FILE` in the store. Returns its
+    /// bytes.
     ///
     /// # Errors
     /// Where it cannot be written.
-    pub fn put(&mut self, to: &Path, layers: &Layers) -> Result<(), DiskError> {
+    pub fn put(&mut self, to: &Path, layers: &Layers) -> Result<u64, DiskError> {
         let name = format!("{}.exr", self.journal.moves.len());
-        layers.write(&staged(&self.store).join(&name))?;
+        let path = staged(&self.store).join(&name);
+        layers.write(&path)?;
         self.journal.moves.push((name, to.to_owned()));
-        Ok(())
+        let meta = fs::metadata(&path).map_err(DiskError::io(&path, "read the golden"))?;
+        Ok(meta.len())
     }
 
     /// Removes a golden, `SCENE/FILE` in the store.

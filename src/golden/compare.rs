@@ -10,6 +10,7 @@ use crate::{
         three_scales, unexplained, upper_tail,
     },
 };
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -24,7 +25,7 @@ const NAMED: usize = 64;
 const KINDS: usize = 5;
 
 /// How an image was held against its golden.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// The same pixels to the last bit.
@@ -40,7 +41,7 @@ pub enum Method {
 }
 
 /// One thing that moved.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", tag = "what")]
 pub enum Moved {
     /// The image holds NaN or infinity where the golden holds a number.
@@ -100,7 +101,7 @@ pub enum Moved {
 }
 
 /// How much the mean of a region moved.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct RegionShift {
     /// The region.
     pub region: Region,
@@ -114,7 +115,7 @@ pub struct RegionShift {
 }
 
 /// A comparison with what it could have seen.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Comparison {
     /// How it was made.
     pub method: Method,
@@ -128,6 +129,7 @@ pub struct Comparison {
     pub distance: f64,
     /// The bias of a tile that would be found with probability .8, in the median
     /// tile; 0 where nothing is sampled.
+    #[schemars(with = "Option<f64>")]
     pub detectable: f64,
     /// Welch's tests made.
     pub tests: usize,
@@ -141,7 +143,7 @@ pub struct Comparison {
 }
 
 /// What the tests of one scale could see.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Seen {
     /// The scale.
     pub scale: Scale,
@@ -151,6 +153,7 @@ pub struct Seen {
     pub rejected: usize,
     /// The bias that would be found with probability .8, in the median place; null
     /// where errors are unknown.
+    #[schemars(with = "Option<f64>")]
     pub detectable: f64,
 }
 

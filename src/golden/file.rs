@@ -6,11 +6,12 @@ use crate::{
     layers::{Layers, pixel_hash},
     metrics::regions::Region,
 };
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::{collections::BTreeMap, path::Path};
 
 /// What must be equal before a golden and an image can be compared at all.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Identity {
     /// The scene by name.
     pub scene: String,
@@ -28,7 +29,7 @@ pub struct Identity {
 
 /// Where a golden comes from. Nothing of this must be equal: it is what may differ
 /// between an image and the golden it is held against.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Provenance {
     /// `cpu` or `gpu`.
     pub renderer: String,

@@ -1,6 +1,7 @@
 //! How far an image without noise may be from its golden.
 
 use crate::metrics::image::{DEFAULT_PPD, ImageError, Pair, SSIM_SIDE, absolute_map, flip, ssim, summary};
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::{fmt, str::FromStr};
 
@@ -31,11 +32,12 @@ impl Default for Limits {
 }
 
 /// A number of a comparison beside its limit.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Measured {
     /// `flip`, `flip-max`, `ssim` or `max`.
     pub metric: &'static str,
     /// What was found.
+    #[schemars(with = "Option<f64>")]
     pub value: f64,
     /// What may be.
     pub limit: f64,

@@ -17,6 +17,7 @@ mod compare;
 mod file;
 mod limits;
 mod picture;
+mod prune;
 mod rays;
 mod sampled;
 mod stale;
@@ -24,19 +25,20 @@ mod store;
 mod verify;
 mod wording;
 
-pub use approve::{Approval, named_by_record};
+pub use approve::{Approval, ApproveError, Approved};
 pub use artifact::Candidates;
-pub use assert::{GoldenError, Goldens, Held, assert_golden, check_golden};
+pub use assert::{CI_VARIABLES, GoldenError, Goldens, Held, assert_golden, check_golden};
 pub use change::Change;
 pub use compare::{Comparison, MUST_SEE, Method, Moved, RegionShift, Seen, Terms, compare};
 pub use file::{Golden, Identity, Provenance};
 pub use image::RgbImage;
 pub use limits::{Limits, Measured};
 pub use picture::{Picture, Tolerance};
+pub use prune::{named_by_record, named_by_suite};
 pub use sampled::{Sampled, TileMeans};
 pub use stale::{STALE_LEVEL, Stale};
 pub use store::{About, Entry, Slot, Snapshot, Store, check_golden_name, golden_cases};
-pub use verify::{ALPHA, Against, Checked, Outcome, Verdict, Verification};
+pub use verify::{ALPHA, Against, Checked, Outcome, VERSION, Verdict, Verification};
 
 #[cfg(test)]
 mod tests;

@@ -15,6 +15,7 @@ use image::RgbImage;
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
+    slice,
 };
 
 /// An image that a test made.
@@ -214,11 +215,19 @@ impl Picture {
                 b.planes().len()
             ));
         }
-        let differs = |i: usize| a.planes().iter().zip(b.planes()).any(|(a, b)| a[i].to_bits() != b[i].to_bits());
-        let mut pixels = (0..a.pixels()).filter(|&i| differs(i));
-        let first = pixels.next().unwrap_or_default();
-        let [x, y] = [first % a.size()[0], first / a.size()[0]];
-        Ok(format!("{} of {} pixels differ, the first at {x},{y}", 1 + pixels.count(), a.pixels()))
+        let told = |(pixels, first): (usize, usize)| {
+            let [x, y] = [first % a.size()[0], first / a.size()[0]];
+            format!("{pixels} of {} pixels differ, the first at {x},{y}", a.pixels())
+        };
+        let same = "the means are the same";
+        match (differing(a.planes(), b.planes()), golden, self) {
+            (Some(found), ..) => Ok(told(found)),
+            (None, Picture::Sampled(a), Picture::Sampled(b)) => {
+                let of_variance = differing(slice::from_ref(&a.variance), slice::from_ref(&b.variance));
+                Ok(of_variance.map_or(same.to_owned(), |found| format!("{same}, the variances of {}", told(found))))
+            }
+            (None, ..) => Ok("the pixels are the same, the kinds of image differ".to_owned()),
+        }
     }
 
     /// A picture of where an image differs from its golden: FLIP of colours, signed
@@ -253,5 +262,30 @@ impl Picture {
             image::Rgb(std::array::from_fn(|c| code(planes[c.min(planes.len() - 1)][i])))
         });
         write_png(path, &picture)
+    }
+}
+
+/// How many pixels of two images of one size differ in a bit of any plane, and the first
+/// of them; None where none does.
+fn differing(a: &[Vec<f32>], b: &[Vec<f32>]) -> Option<(usize, usize)> {
+    let differs = |i: &usize| a.iter().zip(b).any(|(a, b)| a[*i].to_bits() != b[*i].to_bits());
+    let mut pixels = (0..a.first()?.len()).filter(differs);
+    let first = pixels.next()?;
+    Some((1 + pixels.count(), first))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_differs_of_a_sample_is_said() {
+        let sample = |a: f32, b: f32| Picture::from(Sampled::of_replicates([2, 1], &[&[0.5, a], &[0.5, b]]));
+        let golden = sample(0.25, 0.75);
+        let said = |image: &Picture| image.differs(&golden, &Tolerance::Exact).unwrap();
+        assert_eq!(said(&golden), None);
+        assert_eq!(said(&sample(0.25, 0.5)).unwrap(), "1 of 2 pixels differ, the first at 1,0");
+        let variance = said(&sample(0.0, 1.0)).unwrap();
+        assert_eq!(variance, "the means are the same, the variances of 1 of 2 pixels differ, the first at 1,0");
     }
 }

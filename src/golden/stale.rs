@@ -1,6 +1,7 @@
 //! Many cases that moved alike: the goldens are probably older than the renderer.
 
 use super::{Checked, Outcome, Verdict};
+use schemars::JsonSchema;
 use serde::Serialize;
 use statrs::distribution::{Binomial, DiscreteCDF};
 use std::collections::BTreeMap;
@@ -9,7 +10,7 @@ use std::collections::BTreeMap;
 pub const STALE_LEVEL: f64 = 0.01;
 
 /// Most cases differ, and their signs agree beyond chance.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Stale {
     /// Cases compared, each golden once.
     pub compared: usize,

@@ -10,6 +10,7 @@ use crate::{
     record::{CaseRecord, Record},
     scenes::check_name,
 };
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::{
     collections::BTreeMap,
@@ -24,7 +25,7 @@ pub struct Store {
 }
 
 /// What a golden's file is called after.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 pub struct Slot {
     /// The scene.
     pub scene: String,
@@ -47,7 +48,7 @@ pub struct Snapshot {
 }
 
 /// A golden of a store, or why it cannot be read.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Entry {
     /// What its file is called after.
     #[serde(flatten)]
@@ -61,7 +62,7 @@ pub struct Entry {
 }
 
 /// What a golden says of itself.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct About {
     /// What it is an image of.
     #[serde(flatten)]
@@ -89,6 +90,13 @@ impl Slot {
     pub fn path(&self) -> PathBuf {
         let name = self.name.as_ref().map_or_else(String::new, |n| format!(".{n}"));
         Path::new(&self.scene).join(format!("{}.{}{name}.exr", self.estimator, self.rays))
+    }
+
+    /// The golden whose file is `SCENE/FILE` in a store; None where that is no golden's.
+    pub fn of_path(path: &Path) -> Option<Slot> {
+        let mut parts = path.iter().map(|part| part.to_str());
+        let (scene, file) = (parts.next()??, parts.next()??);
+        if parts.next().is_some() { None } else { Slot::parse(scene, file) }
     }
 
     /// What a file is called after; None for files that are no goldens. Estimators may
@@ -164,7 +172,8 @@ impl Store {
         Change::begin(&self.folder, waiting)
     }
 
-    fn snapshot(&self) -> Result<Snapshot, DiskError> {
+    /// The files as they are now: whole only while a lock is held.
+    pub(super) fn snapshot(&self) -> Result<Snapshot, DiskError> {
         let mut files = BTreeMap::new();
         for (scene, path) in entries(&self.folder)? {
             if scene.starts_with('.') || !path.is_dir() {

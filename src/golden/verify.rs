@@ -12,6 +12,7 @@ use crate::{
     record::{CaseRecord, Record},
 };
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -19,8 +20,11 @@ use std::path::{Path, PathBuf};
 /// renderer is refused.
 pub const ALPHA: f64 = 0.01;
 
+/// Version of what `golden verify`, `list` and `size` print as JSON.
+pub const VERSION: u32 = 1;
+
 /// What came of one case.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// There is no golden of this case.
@@ -34,7 +38,7 @@ pub enum Verdict {
 }
 
 /// A golden and what came of it.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Against {
     /// The golden's file.
     pub golden: PathBuf,
@@ -43,7 +47,7 @@ pub struct Against {
 }
 
 /// A case and what came of it.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Checked {
     /// The case.
     pub case: String,
@@ -71,8 +75,10 @@ pub enum Outcome {
 }
 
 /// What came of a record.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Verification {
+    /// Version of this format.
+    pub version: u32,
     /// The family error over all cases.
     pub alpha: f64,
     /// The cases, in the order of the record.
@@ -150,7 +156,8 @@ impl Store {
         self.reading(|snapshot| {
             let check = |case: &&CaseRecord| self.check(snapshot, folder, record, case, cases.len());
             let checked: Vec<Checked> = cases.par_iter().map(check).collect();
-            Verification { alpha: ALPHA, stale: stale(&checked), cases: checked, interrupted: snapshot.interrupted }
+            let (version, stale, interrupted) = (VERSION, stale(&checked), snapshot.interrupted);
+            Verification { version, alpha: ALPHA, cases: checked, stale, interrupted }
         })
     }
 

@@ -2,15 +2,17 @@
 //! they differ.
 
 use super::upper_tail;
+use schemars::JsonSchema;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 /// Noise of one image beside that of another.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Noise {
     /// Variance of the first over that of the second, summed over the image; above 1
     /// the first is noisier. 1 where neither has any, infinite where the second has
     /// none.
+    #[schemars(with = "Option<f64>")]
     pub ratio: f64,
     /// Two-sided p-value of "both are equally noisy"; 1 where there is nothing to test.
     pub p: f64,

@@ -1,8 +1,8 @@
 //! `aogauge golden approve`
 
-use super::{Exit, Failure, bytes, nothing, print, tell, waiting};
+use super::{Exit, Failure, LARGE, bytes, nothing, print, tell, waiting, warn_if_large};
 use crate::{
-    golden::{Approval, Candidates, Limits, Store, check_golden_name},
+    golden::{Approval, ApproveError, Candidates, Limits, Store, check_golden_name},
     record::Record,
 };
 use clap::ValueEnum;
@@ -68,18 +68,28 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
         name: args.name.as_deref(),
         limits: args.tolerance,
     };
-    let written = store.approve(candidates.folder(), &record, &approval, &waiting)?;
-    if written.is_empty() {
+    let approved = store.approve(candidates.folder(), &record, &approval, &waiting).map_err(|e| match e {
+        ApproveError::Disk(e) => Failure::from(e),
+        lost @ ApproveError::Lost { .. } => {
+            let message = format!("{lost}. Run again, or select others with --only");
+            Failure { exit: Exit::Incomplete, message }
+        }
+    })?;
+    if approved.files.is_empty() {
         return Err(nothing(&record, &args.only));
     }
-    for path in &written {
+    for path in &approved.files {
         print(&format!("{}\n", path.display()))?;
     }
+    let (before, after) = (approved.before, approved.after);
+    let than = if after < before { "less" } else { "more" };
     tell(&format!(
-        "{} goldens approved: {}; the store holds {}",
-        written.len(),
+        "{} goldens approved: {}; the store holds {}, {} {than} than before",
+        approved.files.len(),
         args.reason,
-        bytes(store.sizes()?.values().sum())
+        bytes(after),
+        bytes(after.abs_diff(before))
     ));
+    warn_if_large(after, LARGE);
     Ok(Exit::Pass)
 }

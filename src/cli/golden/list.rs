@@ -1,7 +1,9 @@
 //! `aogauge golden list`
 
 use super::{Exit, Failure, Format, bytes, json, print, tell};
-use crate::golden::{Entry, Store};
+use crate::golden::{Entry, Store, VERSION};
+use schemars::JsonSchema;
+use serde::Serialize;
 use std::path::PathBuf;
 
 /// List goldens with where they come from.
@@ -19,6 +21,15 @@ pub struct Args {
     format: Format,
 }
 
+/// What `golden list --format json` prints.
+#[derive(Serialize, JsonSchema)]
+pub struct Listing {
+    /// Version of this format.
+    version: u32,
+    /// The goldens, in order.
+    goldens: Vec<Entry>,
+}
+
 pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     let mut entries = Store::new(&args.goldens).entries()?;
     entries.retain(|e| e.slot.path().to_string_lossy().replace('\\', "/").contains(&args.only));
@@ -26,13 +37,14 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
         let message = format!("{} holds no golden that contains '{}'", args.goldens.display(), args.only);
         return Err(Failure { exit: Exit::Nothing, message });
     }
-    match args.format {
-        Format::Json => print(&json(&entries)?)?,
-        Format::Text => print(&table(&entries))?,
-    }
     let broken = entries.iter().filter(|e| e.golden.is_err()).count();
     let total: u64 = entries.iter().map(|e| e.bytes).sum();
-    tell(&format!("{} goldens, {}; {broken} cannot be read", entries.len(), bytes(total)));
+    let said = format!("{} goldens, {}; {broken} cannot be read", entries.len(), bytes(total));
+    match args.format {
+        Format::Text => print(&table(&entries))?,
+        Format::Json => print(&json(&Listing { version: VERSION, goldens: entries })?)?,
+    }
+    tell(&said);
     Ok(if broken > 0 { Exit::Golden } else { Exit::Pass })
 }
 

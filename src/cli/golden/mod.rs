@@ -3,12 +3,19 @@
 mod approve;
 mod list;
 mod prune;
+mod remove;
 mod size;
 mod verify;
 
 use super::{Exit, Failure, Format, json, print, tell};
 use crate::record::Record;
 use clap::Subcommand;
+
+pub(super) use list::Listing;
+pub(super) use size::Sizes;
+
+/// Beyond this a repository is slow to clone, bytes.
+const LARGE: u64 = 50_000_000;
 
 /// Accept images as goldens, and hold records against them.
 #[derive(Debug, Subcommand)]
@@ -17,6 +24,7 @@ pub enum Verb {
     Approve(approve::Args),
     List(list::Args),
     Prune(prune::Args),
+    Remove(remove::Args),
     Size(size::Args),
 }
 
@@ -26,6 +34,7 @@ pub fn execute(verb: &Verb) -> Result<Exit, Failure> {
         Verb::Approve(args) => approve::execute(args),
         Verb::List(args) => list::execute(args),
         Verb::Prune(args) => prune::execute(args),
+        Verb::Remove(args) => remove::execute(args),
         Verb::Size(args) => size::execute(args),
     }
 }
@@ -41,6 +50,17 @@ fn nothing(record: &Record, only: &str) -> Failure {
 /// Says that another change of the store is waited for.
 fn waiting() {
     tell("aogauge: another command reads or changes the goldens; waiting for it to end");
+}
+
+/// Says what a large store costs.
+fn warn_if_large(total: u64, limit: u64) {
+    if total > limit {
+        tell(&format!(
+            "goldens hold {}, more than {}: every clone carries them and their history; prune, take smaller views, or keep them in Git LFS",
+            bytes(total),
+            bytes(limit)
+        ));
+    }
 }
 
 /// Bytes for people, by powers of 1,000.

@@ -1,12 +1,10 @@
 //! `aogauge golden size`
 
-use super::{Exit, Failure, Format, bytes, json, print, tell};
-use crate::golden::Store;
+use super::{Exit, Failure, Format, LARGE, bytes, json, print, warn_if_large};
+use crate::golden::{Store, VERSION};
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::{collections::BTreeMap, path::PathBuf};
-
-/// Beyond this a repository is slow to clone.
-const LARGE: u64 = 50_000_000;
 
 /// Show how much goldens hold, by scene, and warn before the repository grows.
 #[derive(Debug, clap::Args)]
@@ -23,16 +21,22 @@ pub struct Args {
     format: Format,
 }
 
-#[derive(Serialize)]
-struct Sizes {
+/// What `golden size --format json` prints.
+#[derive(Serialize, JsonSchema)]
+pub struct Sizes {
+    /// Version of this format.
+    version: u32,
+    /// Bytes of all goldens.
     total: u64,
+    /// The limit that was given, bytes.
     limit: Option<u64>,
+    /// Bytes of each scene's goldens.
     scenes: BTreeMap<String, u64>,
 }
 
 pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     let scenes = Store::new(&args.goldens).sizes()?;
-    let sizes = Sizes { total: scenes.values().sum(), limit: args.limit, scenes };
+    let sizes = Sizes { version: VERSION, total: scenes.values().sum(), limit: args.limit, scenes };
     match args.format {
         Format::Json => print(&json(&sizes)?)?,
         Format::Text => {
@@ -42,14 +46,8 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
             print(&format!("{:>10}  all\n", bytes(sizes.total)))?;
         }
     }
+    warn_if_large(sizes.total, args.limit.unwrap_or(LARGE));
     let above = args.limit.is_some_and(|limit| sizes.total > limit);
-    if above || args.limit.is_none() && sizes.total > LARGE {
-        let limit = bytes(args.limit.unwrap_or(LARGE));
-        tell(&format!(
-            "goldens hold {}, more than {limit}: every clone carries them and their history; prune, take smaller views, or keep them in Git LFS",
-            bytes(sizes.total)
-        ));
-    }
     Ok(if above { Exit::Failed } else { Exit::Pass })
 }
 

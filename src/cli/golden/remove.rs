@@ -1,0 +1,64 @@
+//! `aogauge golden remove`
+
+use super::{Exit, Failure, print, tell, waiting};
+use crate::golden::{Slot, Store};
+use std::{
+    collections::BTreeSet,
+    ffi::{OsStr, OsString},
+    fs,
+    path::{Path, PathBuf},
+};
+
+/// Remove goldens by name, such as those that later ones have superseded: all that are
+/// given, or none.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  aogauge golden remove curtain-room/classic.32.radeon\n  \
+aogauge golden remove goldens/*/*.radeon.exr")]
+pub struct Args {
+    /// Goldens as `golden list` names them, with or without .exr, or by their files in
+    /// the folder of goldens.
+    #[arg(required = true, value_name = "GOLDEN")]
+    names: Vec<PathBuf>,
+    /// The folder of goldens.
+    #[arg(long, default_value = "goldens")]
+    goldens: PathBuf,
+}
+
+pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
+    let store = Store::new(&args.goldens);
+    let slots: BTreeSet<Slot> =
+        args.names.iter().map(|name| slot(name, &args.goldens)).collect::<Result<_, Failure>>()?;
+    let missing = store.remove(&slots, &waiting)?;
+    if let Some(first) = missing.first() {
+        let message = format!(
+            "{} of {} goldens do not exist, the first is {}; nothing is removed",
+            missing.len(),
+            slots.len(),
+            store.path(first).display()
+        );
+        return Err(Failure { exit: Exit::Golden, message });
+    }
+    for slot in &slots {
+        print(&format!("{}\n", store.path(slot).display()))?;
+    }
+    tell(&format!("{} goldens removed", slots.len()));
+    Ok(Exit::Pass)
+}
+
+fn slot(name: &Path, goldens: &Path) -> Result<Slot, Failure> {
+    let mut parts: Vec<OsString> = name.iter().rev().take(2).map(OsStr::to_owned).collect();
+    if let Some(file) = parts.first_mut().filter(|f| !f.to_string_lossy().ends_with(".exr")) {
+        file.push(".exr");
+    }
+    let folder = name.parent().and_then(Path::parent).unwrap_or(Path::new(""));
+    let is_within = folder.as_os_str().is_empty()
+        || fs::canonicalize(folder).is_ok_and(|a| fs::canonicalize(goldens).is_ok_and(|b| a == b));
+    let slot = Slot::of_path(&parts.iter().rev().collect::<PathBuf>()).filter(|_| is_within);
+    slot.ok_or_else(|| {
+        Failure::usage(format!(
+            "'{}' is no golden of {}: give SCENE/ESTIMATOR.RAYS or SCENE/ESTIMATOR.RAYS.NAME",
+            name.display(),
+            goldens.display()
+        ))
+    })
+}
