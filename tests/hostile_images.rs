@@ -207,7 +207,7 @@ fn honest_images_may_change() {
                 assert!(took < most(path), "{name} with {value} at {i} took {took} bytes");
             }
             let (_, took) = read_all_ways(path, &whole[..i]);
-            assert!(true || took < most(path), "{name} cut at {i} took {took} bytes");
+            assert!(took < most(path), "{name} cut at {i} took {took} bytes");
         }
         assert!(images > 0, "{name}: some bytes may change");
         println!("{name}: {} bytes, {images} changes leave an image, at most {peak} bytes were taken", whole.len());
@@ -246,8 +246,8 @@ fn flat() -> Vec<(&'static str, Vec<u8>)> {
         ("palette.png", png(png::ColorType::Indexed, png::BitDepth::One, 960)),
         ("rgb.png", png(png::ColorType::Rgb, png::BitDepth::Eight, 7680 * 3)),
         ("fax.tiff", fax(SIDES)),
-        ("zip.exr", exr(exr::prelude::Compression::ZIP16, &[floats.clone()])),
-        ("dwa.exr", exr(exr::prelude::Compression::DWAB(None), &[floats])),
+        ("zip.exr", exr(exr::prelude::Compression::ZIP16, std::slice::from_ref(&floats))),
+        ("dwa.exr", exr(exr::prelude::Compression::DWAB(None), std::slice::from_ref(&floats))),
         ("grey.jpg", encode(ImageFormat::Jpeg, &grey)),
         ("old.hdr", old_hdr(SIDES)),
     ]
