@@ -1,10 +1,13 @@
 //! Images on disk: named layers of 32-bit floats in OpenEXR, and PNG for looking
 //! at.
 
-use crate::disk::{DiskError, write_whole};
+use crate::{
+    claim::{self, MAX_BYTES},
+    disk::{DiskError, write_whole},
+};
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, MetaData, ReadChannels, ReadLayers,
-    Text, Vec2, WritableImage, attribute::AttributeValue,
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, ReadChannels, ReadLayers, Text,
+    Vec2, WritableImage, attribute::AttributeValue,
 };
 use sha2::{Digest, Sha256};
 use std::{
@@ -32,13 +35,6 @@ pub struct Layers {
 
 /// Our attribute in the file.
 const ATTRIBUTE: &str = "aogauge";
-
-/// More bytes of pixels than this for a byte of file is no honest compression.
-const MAX_RATIO: u64 = 2000;
-
-/// What a file and what decoding it may take, bytes: two 16-bit RGB images of
-/// 16,384 pixels a side.
-pub(crate) const MAX_BYTES: u64 = 3 << 30;
 
 impl Layers {
     /// No layers yet.
@@ -100,21 +96,8 @@ impl Layers {
     /// # Errors
     /// As [`Layers::read`].
     pub fn decode(path: &Path, bytes: &[u8]) -> Result<Self, DiskError> {
+        claim::exr(path, bytes)?;
         let broken = |e: exr::error::Error| DiskError::content(path, format!("not a readable OpenEXR image: {e}"));
-        let meta = MetaData::read_from_buffered(io::Cursor::new(bytes), false).map_err(broken)?;
-        // In 128 bits: sides and channels come from the file.
-        let bytes_of = |[width, height, pixel]: [usize; 3]| width as u128 * height as u128 * pixel as u128;
-        let claimed: u128 =
-            meta.headers.iter().map(|h| bytes_of([h.layer_size.0, h.layer_size.1, h.channels.bytes_per_pixel])).sum();
-        if claimed > bytes.len() as u128 * u128::from(MAX_RATIO) {
-            return Err(DiskError::content(
-                path,
-                format!(
-                    "the header claims {claimed} bytes of pixels, more than {} bytes of file can hold",
-                    bytes.len()
-                ),
-            ));
-        }
         let image = exr::prelude::read()
             .no_deep_data()
             .largest_resolution_level()

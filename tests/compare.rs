@@ -3,7 +3,7 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
 
 use aogauge::layers::Layers;
-use image::{Luma, Rgb, RgbImage};
+use image::{Luma, Rgb, RgbImage, Rgba, RgbaImage};
 use serde_json::Value;
 use std::{
     path::Path,
@@ -168,6 +168,92 @@ fn one_picture_shows_both_images_and_the_map() {
 }
 
 #[test]
+fn the_difference_is_written_as_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    pictures(folder.path());
+    let signed = |args: &[&str]| {
+        let out = compare(folder.path(), &[args, &["--diff", "d.EXR"]].concat());
+        assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+        Layers::read(&folder.path().join("d.EXR")).unwrap()
+    };
+    for exact in [&[][..], &["--exact"]] {
+        let found = signed(&[&["b.png", "a.png", "--crop", "15,2,10,3"], exact].concat());
+        assert_eq!(found.resolution, [10, 3]);
+        assert_eq!(found.layers.keys().collect::<Vec<_>>(), ["signed.B", "signed.G", "signed.R"]);
+        for values in found.layers.values() {
+            assert!(values.iter().zip(0..).all(|(v, i)| (v + if i % 10 < 5 { 0.2 } else { 0.0 }).abs() < 1e-6));
+        }
+    }
+    let write = |name: &str, value| {
+        let mut values = vec![value; 12];
+        values[7] = f32::NAN;
+        Layers::new([4, 3]).with("mean", values).write(&folder.path().join(name)).unwrap();
+    };
+    write("a.exr", 0.75);
+    write("b.exr", 2.0);
+    for exact in [&[][..], &["--exact"]] {
+        let found = signed(&[&["a.exr", "b.exr"], exact].concat());
+        let values = found.get("signed").unwrap();
+        assert!(values[7].is_nan() && values[6] == 1.25, "{values:?}");
+    }
+}
+
+#[test]
+fn exact_shows_which_pixels_differ() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture =
+        |seen: u8| RgbaImage::from_fn(6, 4, |x, y| Rgba([x as u8 * 40, 0, 0, if y == 1 { seen } else { 255 }]));
+    picture(255).save(folder.path().join("a.png")).unwrap();
+    picture(250).save(folder.path().join("b.png")).unwrap();
+    let marked = |args: &[&str]| {
+        let out = compare(folder.path(), &[args, &["--exact", "--diff", "out/d.png", "--format", "json"]].concat());
+        let found = pair(&out);
+        let picture = image::open(folder.path().join("out/d.png")).unwrap().to_rgb8();
+        let red = picture.enumerate_pixels().filter(|(.., p)| p.0 == [255, 0, 0]);
+        let red: Vec<_> = red.map(|(x, y, _)| [x, y]).collect();
+        assert_eq!(found["exact"]["differing"], red.len());
+        // The rest is a faded picture of the reference.
+        assert!(picture.pixels().all(|p| p.0 == [255, 0, 0] || p.0[0] == p.0[1] && p.0[1] == p.0[2] && p.0[0] > 190));
+        (found, red)
+    };
+    // In alpha alone, of pixels that count.
+    let (_, red) = marked(&["a.png", "b.png", "--ignore", "0,0,4,4"]);
+    assert_eq!(red, [[4, 1], [5, 1]]);
+    assert_eq!(marked(&["a.png", "b.png", "--tolerance", "5/255"]).1.len(), 0);
+    std::fs::copy(folder.path().join("a.png"), folder.path().join("same.png")).unwrap();
+    let (found, red) = marked(&["a.png", "same.png"]);
+    assert_eq!((found["exact"]["identical_files"].as_bool(), red.len()), (Some(true), 0));
+}
+
+#[test]
+fn alpha_in_one_image_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    pictures(folder.path());
+    image::open(folder.path().join("b.png")).unwrap().to_rgba8().save(folder.path().join("solid.png")).unwrap();
+    let told =
+        "the reference has the channels R, G, B and the test image R, G, B, A: alpha is 1 everywhere and left out";
+    assert_eq!(pair(&compare(folder.path(), &["a.png", "solid.png", "--format", "json"]))["note"], told);
+    assert!(text(&compare(folder.path(), &["a.png", "solid.png"]).stdout).contains(&format!("note: {told}\n")));
+    assert!(pair(&compare(folder.path(), &["solid.png", "solid.png", "--format", "json"]))["note"].is_null());
+    // OpenEXR too.
+    let file = |name: &str, alpha: Option<f32>| {
+        let colors = ["R", "G", "B"].iter().fold(Layers::new([4, 1]), |l, n| l.with(&format!("c.{n}"), vec![0.5; 4]));
+        let all = alpha.map_or(colors.clone(), |a| colors.with("c.A", vec![1.0, 1.0, 1.0, a]));
+        all.write(&folder.path().join(name)).unwrap();
+    };
+    file("a.exr", None);
+    file("solid.exr", Some(1.0));
+    file("glass.exr", Some(0.5));
+    let args = ["solid.exr", "a.exr", "--layer", "c", "--format", "json"];
+    assert!(pair(&compare(folder.path(), &args))["note"].as_str().unwrap().contains("alpha is 1 everywhere"));
+    let out = compare(folder.path(), &["glass.exr", "a.exr", "--layer", "c"]);
+    assert_eq!(out.status.code(), Some(2));
+    assert!(
+        text(&out.stderr).contains("channels R, G, B, A and the test image R, G, B, and alpha is not 1 everywhere")
+    );
+}
+
+#[test]
 fn maps_are_pictures_and_numbers() {
     let folder = tempfile::tempdir().unwrap();
     pictures(folder.path());
@@ -210,6 +296,13 @@ fn mistakes_end_with_2_and_a_sentence() {
     RgbImage::new(8, 9).save(folder.path().join("small.png")).unwrap();
     image::GrayImage::new(40, 30).save(folder.path().join("grey.png")).unwrap();
     std::fs::write(folder.path().join("words.png"), "words").unwrap();
+    image::Rgb32FImage::new(40, 30).save(folder.path().join("floats.hdr")).unwrap();
+    ["R", "G", "B"]
+        .iter()
+        .fold(Layers::new([40, 30]), |l, n| l.with(n, vec![0.5; 1200]))
+        .write(&folder.path().join("floats.exr"))
+        .unwrap();
+    RgbaImage::from_fn(40, 30, |x, _| Rgba([102, 102, 102, x as u8])).save(folder.path().join("glass.png")).unwrap();
     for (args, message) in [
         (&["a.png", "none.png"][..], "none.png: cannot read the image"),
         (&["a.png", "words.png"], "words.png: not a readable image"),
@@ -227,6 +320,19 @@ fn mistakes_end_with_2_and_a_sentence() {
             "--exact computes differing and largest-difference alone",
         ),
         (&["a.png", "b.png", "--exact", "--maps", "m"], "cannot be used with"),
+        (&["none.png", "b.png", "--diff", "d.jpg"], "must end in .png, for a picture, or in .exr, for the signed"),
+        (&["none.png", "b.png", "--diff", "d"], "must end in .png, for a picture, or in .exr, for the signed"),
+        (&["a.png", "floats.exr"], "the test image holds floats (as OpenEXR does), which are taken for linear light"),
+        (
+            &["a.png", "floats.exr", "--exact"],
+            "save both in one format, or say by --encoding linear or --encoding srgb",
+        ),
+        (&["a.png", "floats.hdr", "--exact"], "one image holds integers (8 or 16 bits a channel) and the other floats"),
+        (
+            &["a.png", "glass.png"],
+            "has the channels R, G, B and the test image R, G, B, A, and alpha is not 1 everywhere",
+        ),
+        (&["a.png", "b.png", "--exact", "--fail", "welch.tiles<=0"], "--exact computes differing"),
         (&["a.png", "b.png", "--tolerance", "2"], "not within 0 to 1"),
         (&["a.png", "b.png", "--ignore", "1,2,3"], "is no rectangle"),
         (&["a.png", "b.png", "--ignore", "30,0,11,1"], "--ignore 30,0,11,1 reaches beyond the image of 40 x 30 pixels"),
@@ -280,6 +386,32 @@ fn replicates_are_tested_at_three_scales() {
     let table = text(&compare(folder.path(), &["a.exr", "brighter.exr"]).stdout);
     assert!(table.contains("surest at 0, 0 (16 x 16): bias +0.0"), "{table}");
     assert!(table.contains("would have been found") && table.contains("95 % interval +0.0"), "{table}");
+}
+
+#[test]
+fn the_test_of_replicates_has_limits() {
+    let folder = tempfile::tempdir().unwrap();
+    record_image(&folder.path().join("a.exr"), 1, 0.0);
+    record_image(&folder.path().join("same.exr"), 2, 0.0);
+    record_image(&folder.path().join("brighter.exr"), 3, 0.05);
+    Layers::new([40, 30]).with("mean", vec![0.6; 1200]).write(&folder.path().join("plain.exr")).unwrap();
+    let held = |test: &str, limit: &str| {
+        let out = compare(folder.path(), &["a.exr", test, "--format", "json", "--fail", limit]);
+        let found: Value = serde_json::from_slice(&out.stdout).unwrap();
+        (out.status.code().unwrap(), found["pairs"][0]["limits"][0].clone())
+    };
+    for limit in ["welch.rejected<=0", "welch.tiles<=0", "welch.image<=0"] {
+        assert_eq!(held("same.exr", limit).0, 0, "{limit}");
+        assert_eq!(held("brighter.exr", limit).0, 1, "{limit}");
+    }
+    assert_eq!(held("brighter.exr", "welch.rejected<=0").1["value"], 2.0);
+    assert_eq!(held("brighter.exr", "welch.tiles<=1").0, 0);
+    // Of 1200 pixels 256 by 0.05.
+    let (code, bias) = held("brighter.exr", "welch.bias<=0.02");
+    assert!(code == 0 && (bias["value"].as_f64().unwrap() - 0.05 * 256.0 / 1200.0).abs() < 0.003, "{bias}");
+    let (code, none) = held("plain.exr", "welch.rejected<=0");
+    assert_eq!((code, none["state"].as_str()), (6, Some("no-value")));
+    assert!(none["note"].as_str().unwrap().contains("two replicates or more"));
 }
 
 /// Openness of binary rays, near 1, with 4 rays on one side and 32 on the other: no

@@ -34,7 +34,7 @@ pub struct Exact {
     pub largest: Option<f64>,
     /// Column and row, in the whole image, of the first pixel that differs.
     pub first: Option<[usize; 2]>,
-    /// The files have the same bytes, so no pixel was decoded.
+    /// The files have the same bytes.
     pub identical_files: bool,
 }
 
@@ -69,8 +69,8 @@ macro_rules! integer {
                 self.abs_diff(other)
             }
             fn within(tolerance: f64) -> $type {
-                // A tolerance of 2/255 means two codes, however it was rounded.
-                (tolerance * f64::from(<$type>::MAX) + 1e-6).floor() as $type
+                let range = f64::from(<$type>::MAX);
+                (within(tolerance, Some(range)) * range).floor() as $type
             }
             fn share(distance: $type) -> f64 {
                 f64::from(distance) / f64::from(<$type>::MAX)
@@ -93,7 +93,7 @@ impl Sample for f32 {
         }
     }
     fn within(tolerance: f64) -> f64 {
-        tolerance
+        within(tolerance, None)
     }
     fn share(distance: f64) -> f64 {
         distance
@@ -135,6 +135,18 @@ pub fn exact(
 /// Rounding of 8 and 16-bit codes as 32-bit floats from 0 to 1, twice: a tolerance of
 /// 1/255 admits one code.
 const ROUNDING: f64 = 1.0 / (1u64 << 22) as f64;
+/// Of a code, so much is rounding of the tolerance: 2/255 means two codes.
+const CODE_ROUNDING: f64 = 1e-6;
+
+/// The largest difference that a tolerance admits, of codes 0 to `range` as shares of it,
+/// or of floats.
+pub(super) fn within(tolerance: f64, range: Option<f64>) -> f64 {
+    match range {
+        Some(range) => tolerance + CODE_ROUNDING / range,
+        None if tolerance > 0.0 => tolerance + ROUNDING,
+        None => 0.0,
+    }
+}
 
 /// The same of two images as floats, of equal shape, cut out of the whole image at
 /// `corner`; `weights` are those of the part.
@@ -157,7 +169,7 @@ pub fn exact_images(
         let [reference, test] = [reference.planes().len(), test.planes().len()];
         return Err(ImageError::Channels { reference, test }.into());
     }
-    let within = if tolerance > 0.0 { tolerance + ROUNDING } else { 0.0 };
+    let within = within(tolerance, None);
     let width = reference.size()[0];
     let rows: Vec<Count<f64>> = (0..reference.size()[1])
         .into_par_iter()
@@ -213,9 +225,8 @@ struct Count<D> {
 
 impl View<'_> {
     fn compare<T: Sample>(&self, a: &[T], b: &[T], tolerance: f64) -> Option<Exact> {
-        let [width, height] = self.size;
-        let whole = super::Rect { x: 0, y: 0, width, height };
-        let part = self.region.crop.unwrap_or(whole);
+        let width = self.size[0];
+        let part = self.region.crop.unwrap_or(super::Rect::whole(self.size));
         let within = T::within(tolerance);
         let rows: Vec<usize> = (part.y..part.y + part.height).step_by(ROWS).collect();
         let counts: Vec<Count<T::Distance>> = rows

@@ -18,6 +18,23 @@ pub enum Measure {
     Differing,
     /// The largest difference of a channel.
     LargestDifference,
+    /// What Welch's test of the replicates of two images of records found.
+    Welch(WelchName),
+}
+
+/// A number of Welch's test.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum WelchName {
+    /// Places where it rejects that both images have one expectation, over all scales.
+    Rejected,
+    /// Of these, pixels.
+    Pixels,
+    /// Tiles.
+    Tiles,
+    /// Whether the whole image does, 0 or 1.
+    Image,
+    /// Mean of the test image less mean of the reference.
+    Bias,
 }
 
 /// A map with a summary.
@@ -56,6 +73,21 @@ impl MapName {
             MapName::Ssim => "ssim",
             MapName::Flip => "flip",
             MapName::HdrFlip => "hdr-flip",
+        }
+    }
+}
+
+impl WelchName {
+    const ALL: [WelchName; 5] =
+        [WelchName::Rejected, WelchName::Pixels, WelchName::Tiles, WelchName::Image, WelchName::Bias];
+
+    fn label(self) -> &'static str {
+        match self {
+            WelchName::Rejected => "welch.rejected",
+            WelchName::Pixels => "welch.pixels",
+            WelchName::Tiles => "welch.tiles",
+            WelchName::Image => "welch.image",
+            WelchName::Bias => "welch.bias",
         }
     }
 }
@@ -119,6 +151,7 @@ impl fmt::Display for Measure {
             Measure::Map(map, statistic) => write!(f, "{}.{}", map.label(), statistic.label()),
             Measure::Differing => f.write_str("differing"),
             Measure::LargestDifference => f.write_str("largest-difference"),
+            Measure::Welch(name) => f.write_str(name.label()),
         }
     }
 }
@@ -134,9 +167,11 @@ impl FromStr for Measure {
         }
         let scores = ScoreName::ALL.into_iter().filter(|&n| n != ScoreName::Ssimulacra2).map(Measure::Score);
         let maps = MapName::ALL.into_iter().flat_map(|m| Statistic::ALL.map(|s| Measure::Map(m, s)));
-        let all = || scores.clone().chain(maps.clone()).chain([Measure::Differing, Measure::LargestDifference]);
+        let exact = [Measure::Differing, Measure::LargestDifference];
+        let welch = WelchName::ALL.map(Measure::Welch);
+        let all = || scores.clone().chain(maps.clone()).chain(exact).chain(welch);
         all().find(|m| m.to_string() == text).ok_or_else(|| {
-            let names = scores.clone().chain([Measure::Differing, Measure::LargestDifference]).map(|m| m.to_string());
+            let names = scores.clone().chain(exact).chain(welch).map(|m| m.to_string());
             let [maps, statistics] = [MapName::ALL.map(MapName::label).join(", "), Statistic::ALL.map(Statistic::label).join(", ")];
             let names = names.collect::<Vec<_>>().join(", ");
             format!("there is no '{text}'; there are: {names}, and MAP.STATISTIC of the maps {maps} and the statistics {statistics}")
@@ -386,9 +421,15 @@ mod tests {
 
     #[test]
     fn limits_are_read_and_written_alike() {
-        for text in
-            ["flip<=0.05", "ssim>=0.98", "hdr-flip.max<=1", "absolute.p99<=0.5", "differing<=0", "mean-error>=-0.01"]
-        {
+        for text in [
+            "flip<=0.05",
+            "ssim>=0.98",
+            "hdr-flip.max<=1",
+            "absolute.p99<=0.5",
+            "differing<=0",
+            "mean-error>=-0.01",
+            "welch.tiles<=0",
+        ] {
             assert_eq!(text.parse::<Limit>().unwrap().to_string(), text);
         }
         for (text, message) in [

@@ -3,6 +3,7 @@
 //!
 //! Any renderer's images will do: nothing here knows of scenes or suites.
 
+mod difference;
 mod exact;
 mod folders;
 mod limits;
@@ -12,10 +13,11 @@ mod region;
 mod report;
 mod sampled;
 
+pub use difference::Difference;
 pub use exact::{Exact, exact, exact_images};
 pub use folders::Pairing;
-pub use limits::{Limit, Limits, MapName, Measure, Sense, Statistic, Tier};
-pub use pictures::{Drawn, side_by_side, write_maps};
+pub use limits::{Limit, Limits, MapName, Measure, Sense, Statistic, Tier, WelchName};
+pub use pictures::{Drawn, Measured, side_by_side, write_maps};
 pub use region::{Rect, Region, Weights};
 pub use report::{Comparison, LimitReport, LimitState, Mode, Outcome, PairReport, VERSION};
 pub use sampled::WelchReport;
@@ -23,7 +25,10 @@ pub use sampled::WelchReport;
 use crate::{
     disk::DiskError,
     metrics::image::{Encoding, ImageError, Options},
-    picture::error_map::MapError,
+    picture::{
+        error_map::MapError,
+        read::{Alpha, Found},
+    },
 };
 use std::path::{Path, PathBuf};
 
@@ -64,8 +69,33 @@ pub enum CompareError {
         size: [usize; 2],
     },
     /// Integers against floats.
-    #[error("one image holds integers and the other floats: the pixel-exact metric compares stored numbers")]
+    #[error(
+        "one image holds integers (8 or 16 bits a channel) and the other floats, and the pixel-exact metric compares \
+         numbers as they are stored: save both in one format, or compare with --encoding and without --exact"
+    )]
     Kinds,
+    /// sRGB codes against linear light.
+    #[error(
+        "{} and {}: save both in one format, or say by --encoding linear or --encoding srgb what the numbers of both \
+         stand for", taken_for("reference", *reference), taken_for("test image", *test)
+    )]
+    Encodings {
+        /// Of the reference.
+        reference: Encoding,
+        /// Of the test image.
+        test: Encoding,
+    },
+    /// One image alone has an alpha channel, and it says something.
+    #[error(
+        "the reference has the channels {reference} and the test image {test}, and alpha is not 1 everywhere: save both \
+         with alpha or both without"
+    )]
+    Alpha {
+        /// Channels of the reference.
+        reference: &'static str,
+        /// Channels of the test image.
+        test: &'static str,
+    },
     /// Data windows of OpenEXR begin at different places.
     #[error("the data windows begin at different pixels: the reference's at {}, {}, the test image's at {}, {}", reference[0], reference[1], test[0], test[1])]
     Origins {
@@ -177,6 +207,9 @@ pub struct Settings {
     pub limits: Limits,
     /// Images of the reference may be missing.
     pub allow_missing: bool,
+    /// The pixel-exact metric alone keeps what `drawn` needs, too: files of the same bytes
+    /// are decoded.
+    pub draw_exact: bool,
 }
 
 impl Settings {
@@ -194,7 +227,8 @@ impl Settings {
 /// Compares two images, or two folders of images by relative path.
 ///
 /// `step` is told how many pairs are done, of how many, and the next one's path.
-/// `drawn` is given every pair that has maps while its images are in memory.
+/// `drawn` is given every pair that has maps, and with [`Settings::draw_exact`] every pair,
+/// while its images are in memory.
 ///
 /// # Errors
 /// Of two files, whatever keeps them from being compared. Of two folders that becomes
@@ -246,6 +280,39 @@ pub fn compare(
     comparison.left_out = pairing.left_out;
     comparison.conclude(settings.allow_missing);
     Ok(comparison)
+}
+
+/// What the numbers of an image are taken for, and why.
+fn taken_for(which: &str, encoding: Encoding) -> String {
+    match encoding {
+        Encoding::Srgb => format!("the {which} holds integers (as PNG and JPEG do), which are taken for sRGB codes"),
+        Encoding::Linear => format!("the {which} holds floats (as OpenEXR does), which are taken for linear light"),
+    }
+}
+
+fn check_encodings(reference: Encoding, test: Encoding) -> Result<(), CompareError> {
+    if reference == test { Ok(()) } else { Err(CompareError::Encodings { reference, test }) }
+}
+
+/// Alpha is left out. Where one image alone has it, that is a note if it is 1 everywhere
+/// and else an error.
+fn check_alpha(reference: &Found, test: &Found) -> Result<Option<String>, CompareError> {
+    if (reference.alpha == Alpha::None) == (test.alpha == Alpha::None) {
+        return Ok(None);
+    }
+    let channels = |found: &Found| match (found.image.planes().len(), found.alpha) {
+        (1, Alpha::None) => "Y",
+        (1, _) => "Y, A",
+        (_, Alpha::None) => "R, G, B",
+        _ => "R, G, B, A",
+    };
+    let (ours, theirs) = (channels(reference), channels(test));
+    if reference.alpha == Alpha::Varied || test.alpha == Alpha::Varied {
+        return Err(CompareError::Alpha { reference: ours, test: theirs });
+    }
+    Ok(Some(format!(
+        "the reference has the channels {ours} and the test image {theirs}: alpha is 1 everywhere and left out"
+    )))
 }
 
 /// The pixels of two images are the same places only where both begin at one.

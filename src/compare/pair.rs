@@ -1,7 +1,10 @@
 //! Two files: read, cut, measured and judged.
 
 use super::{
-    CompareError, Drawn, Exact, Layer, Mask, Mode, PairReport, Settings, Weights, check_origins, exact, exact_images,
+    CompareError, Difference, Drawn, Exact, Layer, Mask, Measured, Mode, PairReport, Rect, Settings, Weights,
+    check_alpha, check_encodings, check_origins,
+    difference::Stored,
+    exact, exact_images,
     sampled::{Sampled, WelchReport},
 };
 use crate::{
@@ -25,7 +28,7 @@ pub(super) struct Files<'a> {
 /// A layer of both images, or why there is none.
 type NamedLayer = (String, Result<(Found, Found), CompareError>);
 
-/// Is given every pair that has maps.
+/// Is given every pair that is drawn.
 type Keep<'a> = dyn FnMut(&PairReport, &Drawn<'_>) -> Result<(), CompareError> + 'a;
 
 impl Files<'_> {
@@ -35,9 +38,9 @@ impl Files<'_> {
         let (reference, test) = (reference?, test?);
         let mask = self.mask(settings.mask.as_ref())?;
         if settings.mode == Mode::Exact {
-            let found = self.exact(&reference, &test, settings, mask.as_ref());
-            if let Some(exact) = found.map_err(|e| self.between(e))? {
-                return Ok(vec![PairReport::judged(self.name, None, exact, None, None, &settings.limits)]);
+            let found = self.exact(&reference, &test, settings, mask.as_ref(), keep);
+            if let Some(report) = found.map_err(|e| self.between(e))? {
+                return Ok(vec![report]);
             }
         }
         let (ours, theirs) = rayon::join(
@@ -46,6 +49,7 @@ impl Files<'_> {
         );
         let (ours, theirs) = (ours?, theirs?);
         let sampled = self.sampled(&reference, &test, settings)?;
+        let same = reference == test;
         drop((reference, test));
         self.layers(ours, theirs, settings.layer == Layer::All)
             .into_iter()
@@ -58,7 +62,12 @@ impl Files<'_> {
                         Ok(PairReport::failed(self.name, Some(layer), &e))
                     }
                     Err(e) => Err(self.between(e)),
-                    Ok(report) => Ok(report),
+                    Ok(mut report) => {
+                        if let Some(exact) = report.exact.as_mut().filter(|_| settings.mode == Mode::Exact) {
+                            exact.identical_files = same;
+                        }
+                        Ok(report)
+                    }
                 }
             })
             .collect()
@@ -101,13 +110,16 @@ impl Files<'_> {
         test: &[u8],
         settings: &Settings,
         mask: Option<&Weights>,
-    ) -> Result<Option<Exact>, CompareError> {
+        keep: &mut Keep<'_>,
+    ) -> Result<Option<PairReport>, CompareError> {
         let region = &settings.region;
-        if reference == test {
+        let judged = |exact| PairReport::judged(self.name, None, exact, None, None, &settings.limits);
+        let same = reference == test;
+        if same && !settings.draw_exact {
             // A header that can be read; what follows it is the same in both.
             let size = read::size(self.reference, reference)?;
             let weights = region.weights(size, mask)?;
-            return Ok(Some(Exact::of_identical_files(size, region, weights.as_deref())));
+            return Ok(Some(judged(Exact::of_identical_files(size, region, weights.as_deref()))));
         }
         if read::is_exr(self.reference, reference) || read::is_exr(self.test, test) {
             return Ok(None);
@@ -122,7 +134,16 @@ impl Files<'_> {
             return Err(ImageError::Size { reference: ours.size, test: theirs.size }.into());
         }
         let weights = region.weights(ours.size, mask)?;
-        exact(&ours, &theirs, region, weights.as_deref(), settings.tolerance).map(Some)
+        let weights = weights.as_deref();
+        let found = exact(&ours, &theirs, region, weights, settings.tolerance)?;
+        let report = judged(Exact { identical_files: same, ..found });
+        if settings.draw_exact {
+            let [reference, test] = [Stored::Samples(&ours), Stored::Samples(&theirs)];
+            let part = region.crop.unwrap_or(Rect::whole(ours.size));
+            let difference = Difference { reference, test, part, weights, tolerance: settings.tolerance };
+            keep(&report, &Drawn { difference, measured: None })?;
+        }
+        Ok(Some(report))
     }
 
     /// One layer of both.
@@ -141,10 +162,8 @@ impl Files<'_> {
         if whole != test.image.size() {
             return Err(ImageError::Size { reference: whole, test: test.image.size() }.into());
         }
-        let encodings = [reference.image.encoding(), test.image.encoding()];
-        if encodings[0] != encodings[1] {
-            return Err(ImageError::Encoding { reference: encodings[0], test: encodings[1] }.into());
-        }
+        check_encodings(reference.image.encoding(), test.image.encoding())?;
+        let note = check_alpha(reference, test)?;
         check_origins(reference.origin, test.origin)?;
         let region = &settings.region;
         let weights = region.weights(whole, mask)?;
@@ -158,16 +177,28 @@ impl Files<'_> {
         let corner = region.crop.map_or([0, 0], |c| [c.x, c.y]);
         let exact = exact_images(reference, test, corner, weights.as_deref(), settings.tolerance)?;
         let layer = Some(layer.to_owned()).filter(|l| !l.is_empty());
+        let difference = Difference {
+            reference: Stored::Image(reference),
+            test: Stored::Image(test),
+            part: Rect::whole(reference.size()),
+            weights: weights.as_deref(),
+            tolerance: settings.tolerance,
+        };
         if settings.mode == Mode::Exact {
-            return Ok(PairReport::judged(self.name, layer, exact, None, None, &settings.limits));
+            let report = PairReport::judged(self.name, layer, exact, None, None, &settings.limits).with_note(note);
+            if settings.draw_exact {
+                keep(&report, &Drawn { difference, measured: None })?;
+            }
+            return Ok(report);
         }
         let pair = Pair::new(reference, test, weights.as_deref())?;
         let (scores, maps) = scores(&pair, &settings.options)?;
         let size = scores.size.map(|n| n as u32);
         let welch = sampled.map(|sampled| WelchReport::of(size, sampled));
         let p = sampled.map(|[reference, test]| move || pixel_p_values(size, &test.sample(), &reference.sample()));
-        let report = PairReport::judged(self.name, layer, exact, Some(scores), welch, &settings.limits);
-        keep(&report, &Drawn { reference, test, maps: &maps, p: p.as_ref().map(|p| p as &dyn Fn() -> Vec<f64>) })?;
+        let report = PairReport::judged(self.name, layer, exact, Some(scores), welch, &settings.limits).with_note(note);
+        let measured = Measured { reference, test, maps: &maps, p: p.as_ref().map(|p| p as &dyn Fn() -> Vec<f64>) };
+        keep(&report, &Drawn { difference, measured: Some(measured) })?;
         Ok(report)
     }
 

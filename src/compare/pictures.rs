@@ -1,7 +1,7 @@
 //! What a comparison draws: a picture and a layer for each map, and one picture for
 //! people with reference, test image and map.
 
-use super::{ALPHA, CompareError};
+use super::{ALPHA, CompareError, Difference};
 use crate::{
     layers::{srgb, write_png},
     metrics::image::{Encoding, Image, Maps},
@@ -14,9 +14,18 @@ use crate::{
 use image::{Rgb, RgbImage};
 use std::path::Path;
 
-/// Two images as they were compared, and the maps of their difference.
+/// What can be drawn of two images that were compared.
 #[derive(Clone, Copy)]
 pub struct Drawn<'a> {
+    /// Both, pixel by pixel.
+    pub difference: Difference<'a>,
+    /// Both with the maps of their difference; None of the pixel-exact metric alone.
+    pub measured: Option<Measured<'a>>,
+}
+
+/// Two images as they were compared, and the maps of their difference.
+#[derive(Clone, Copy)]
+pub struct Measured<'a> {
     /// What is compared with.
     pub reference: &'a Image,
     /// What is compared.
@@ -38,7 +47,7 @@ fn size(image: &Image) -> [u32; 2] {
 ///
 /// # Errors
 /// Where the scale is none or a file cannot be written.
-pub fn write_maps(folder: &Path, drawn: &Drawn<'_>, scale: f64) -> Result<(), CompareError> {
+pub fn write_maps(folder: &Path, drawn: &Measured<'_>, scale: f64) -> Result<(), CompareError> {
     let size = size(drawn.reference);
     let maps = drawn.maps;
     let mut all = Vec::new();
@@ -68,7 +77,7 @@ pub fn write_maps(folder: &Path, drawn: &Drawn<'_>, scale: f64) -> Result<(), Co
 ///
 /// # Errors
 /// Where the map does not fit the images.
-pub fn side_by_side(drawn: &Drawn<'_>) -> Result<RgbImage, CompareError> {
+pub fn side_by_side(drawn: &Measured<'_>) -> Result<RgbImage, CompareError> {
     let hdr = !drawn.maps.hdr_flip.is_empty();
     let (title, values) = if hdr { ("HDR-FLIP", &drawn.maps.hdr_flip) } else { ("FLIP", &drawn.maps.flip) };
     let map = ErrorMap::new(size(drawn.reference), values.clone(), Scale::flip())?;

@@ -46,6 +46,11 @@ impl fmt::Display for Rect {
 }
 
 impl Rect {
+    /// All of an image.
+    pub(super) fn whole([width, height]: [usize; 2]) -> Self {
+        Rect { x: 0, y: 0, width, height }
+    }
+
     fn check(&self, option: &'static str, [width, height]: [usize; 2]) -> Result<(), CompareError> {
         let inside =
             |from: usize, length: usize, whole: usize| from.checked_add(length).is_some_and(|end| end <= whole);

@@ -1,7 +1,10 @@
 //! What a comparison found, as programs read it.
 
-use super::{CompareError, Exact, Limit, Limits, Measure, Settings, Tier, WelchReport};
-use crate::metrics::image::{ScoreName, Scores};
+use super::{CompareError, Exact, Limit, Limits, Measure, Settings, Tier, WelchName, WelchReport};
+use crate::{
+    metrics::image::{ScoreName, Scores},
+    stats::Scale,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -97,6 +100,9 @@ pub struct PairReport {
     /// Why it could not be compared, or fails though no limit is broken.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
+    /// What is to be known of it, and changes no outcome.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
     /// Limits with their values.
     pub limits: Vec<LimitReport>,
     /// Pixel by pixel.
@@ -118,6 +124,7 @@ impl PairReport {
             layer,
             outcome: Outcome::Error,
             reason: Some(error.to_string()),
+            note: None,
             limits: Vec::new(),
             exact: None,
             scores: None,
@@ -135,8 +142,10 @@ impl PairReport {
         limits: &Limits,
     ) -> Self {
         let limits = limits.of(path);
-        let reports: Vec<LimitReport> =
-            limits.iter().map(|(tier, limit)| report(*tier, limit, &exact, scores.as_ref())).collect();
+        let reports: Vec<LimitReport> = limits
+            .iter()
+            .map(|(tier, limit)| report(*tier, limit, (&exact, scores.as_ref(), welch.as_ref())))
+            .collect();
         // NaN in one image only is a fault that no mean shows.
         let one_sided = scores.as_ref().and_then(|s| s.non_finite.check().err());
         let any = |state: LimitState, tier: Option<Tier>| {
@@ -154,13 +163,22 @@ impl PairReport {
             Outcome::Pass
         };
         let reason = one_sided.map(|e| e.to_string());
-        PairReport { path: path.to_owned(), layer, outcome, reason, limits: reports, exact: Some(exact), scores, welch }
+        let (path, exact) = (path.to_owned(), Some(exact));
+        PairReport { path, layer, outcome, reason, note: None, limits: reports, exact, scores, welch }
+    }
+
+    /// With what is to be known of it.
+    pub(super) fn with_note(self, note: Option<String>) -> Self {
+        PairReport { note, ..self }
     }
 }
 
-fn report(tier: Tier, limit: &Limit, exact: &Exact, scores: Option<&Scores>) -> LimitReport {
+/// What limits are held against.
+type Numbers<'a> = (&'a Exact, Option<&'a Scores>, Option<&'a WelchReport>);
+
+fn report(tier: Tier, limit: &Limit, found: Numbers<'_>) -> LimitReport {
     let limit_text = limit.to_string();
-    match value(limit.measure, exact, scores) {
+    match value(limit.measure, found) {
         Ok(value) => LimitReport {
             tier,
             limit: limit_text,
@@ -173,7 +191,7 @@ fn report(tier: Tier, limit: &Limit, exact: &Exact, scores: Option<&Scores>) -> 
 }
 
 /// The value that a limit is held against; infinite where PSNR or a difference is.
-fn value(measure: Measure, exact: &Exact, scores: Option<&Scores>) -> Result<f64, String> {
+fn value(measure: Measure, (exact, scores, welch): Numbers<'_>) -> Result<f64, String> {
     let absent = |name: &str| {
         let note = scores.and_then(|s| s.scores.iter().find(|s| s.name.label() == name)).and_then(|s| s.note.clone());
         note.unwrap_or_else(|| format!("{measure} was not computed"))
@@ -187,11 +205,31 @@ fn value(measure: Measure, exact: &Exact, scores: Option<&Scores>) -> Result<f64
             let infinite = (name == ScoreName::Psnr && equal).then_some(f64::INFINITY);
             found.or(infinite).ok_or_else(|| absent(name.label()))
         }
+        Measure::Welch(name) => welch_value(name, welch),
         Measure::Map(map, statistic) => {
             let summary = scores.and_then(|s| s.maps.get(map.label()));
             summary.map(|s| statistic.of(s)).ok_or_else(|| absent(map.label()))
         }
     }
+}
+
+/// A scale at which the test can see nothing has no value: that it rejects nothing there
+/// would pass whatever the images are.
+fn welch_value(name: WelchName, welch: Option<&WelchReport>) -> Result<f64, String> {
+    let welch = welch.ok_or("both images need two replicates or more, and must be compared whole")?;
+    let scale = match name {
+        WelchName::Bias if welch.bias.is_finite() => return Ok(welch.bias),
+        WelchName::Bias => return Err("no pixel has a number in all replicates".to_owned()),
+        WelchName::Rejected => None,
+        WelchName::Pixels => Some(Scale::Pixel),
+        WelchName::Tiles => Some(Scale::Tile),
+        WelchName::Image => Some(Scale::Image),
+    };
+    let asked = welch.scales.iter().filter(|s| scale.is_none_or(|scale| s.scale == scale));
+    let (rejected, sees) = asked.fold((0, false), |(n, sees), s| {
+        (n + s.rejected.len(), sees || s.detectable > 0.0 && s.detectable.is_finite() || !s.rejected.is_empty())
+    });
+    if sees { Ok(rejected as f64) } else { Err("what bias the test would have found is not known".to_owned()) }
 }
 
 /// All that was found.

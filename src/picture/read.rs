@@ -1,22 +1,22 @@
 //! Images of other programs: OpenEXR, PNG, JPEG, Radiance HDR and TIFF become
 //! planes of numbers with a stated encoding.
 
-use super::read_exr::{self, exr_size};
+use super::{
+    read_exr::{self, exr_size},
+    read_png, tiff_lists,
+};
 use crate::{
+    claim::{self, MAX_BYTES, MAX_RATIO, MAX_SIDE},
     disk::DiskError,
-    layers::{MAX_BYTES, load},
+    layers::load,
     metrics::image::{Encoding, Image},
 };
-use image::{DynamicImage, ImageReader, Limits};
+use image::{DynamicImage, ImageFormat, ImageReader, Limits};
 use std::{io::Cursor, path::Path};
 
-/// An image may be this wide and high, pixels.
-pub(super) const MAX_SIDE: u32 = 65_536;
-/// What any file may decode to, bytes, however small it is.
-const MIN_BYTES: u64 = 4 << 20;
-/// More bytes of pixels than this for a byte of file is no honest compression:
-/// deflate ends at 1032.
-const MAX_RATIO: u64 = 2000;
+/// What a JPEG may decode to, bytes, however small it is. It needs no more: a block of
+/// 8 x 8 samples takes a bit or more, so RGB of one colour is 1536 bytes for a byte of file.
+const JPEG_BYTES: u64 = 4 << 20;
 
 /// The first bytes of an OpenEXR file.
 const EXR: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
@@ -46,6 +46,27 @@ pub struct Found {
     pub layer: String,
     /// Where the pixels begin: the corner of an OpenEXR data window, else 0, 0.
     pub origin: [i32; 2],
+    /// The alpha channel that was left out.
+    pub alpha: Alpha,
+}
+
+/// An alpha channel that is left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Alpha {
+    /// There is none.
+    #[default]
+    None,
+    /// It is 1 everywhere.
+    One,
+    /// It is not.
+    Varied,
+}
+
+impl Alpha {
+    /// By whether each pixel's is 1.
+    pub(super) fn of(mut ones: impl Iterator<Item = bool>) -> Self {
+        if ones.all(|one| one) { Alpha::One } else { Alpha::Varied }
+    }
 }
 
 /// The samples of an image as they are stored, channels of a pixel side by side.
@@ -79,8 +100,8 @@ pub enum Values {
 ///
 /// # Errors
 /// [`DiskError`] naming the file where it cannot be read or decoded, claims more
-/// than 65,536 pixels a side, 3 GiB or 2000 bytes for a byte of file, or has no such
-/// layer.
+/// than 65,536 pixels a side, 3 GiB or what so many bytes of file may hold, or has no
+/// such layer.
 pub fn read(path: &Path, layer: Option<&str>, encoding: Option<Encoding>) -> Result<Found, DiskError> {
     let choice = layer.map_or(LayerChoice::Main, LayerChoice::Named);
     let mut found = decode(path, &load(path)?, choice, encoding)?;
@@ -99,23 +120,57 @@ pub fn decode(
     encoding: Option<Encoding>,
 ) -> Result<Vec<Found>, DiskError> {
     if is_exr(path, bytes) {
-        return read_exr::decode(path, bytes, choice, encoding.unwrap_or(Encoding::Linear), most(bytes));
+        return read_exr::decode(path, bytes, choice, encoding.unwrap_or(Encoding::Linear));
     }
     if matches!(choice, LayerChoice::Named(_)) {
         return Err(DiskError::content(path, "only OpenEXR images have layers"));
     }
-    let decoded = decode_dynamic(path, bytes)?;
-    let floats = matches!(decoded, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_));
+    let samples = decode_samples(path, bytes)?;
+    let floats = matches!(samples.values, Values::F32(_));
     let encoding = encoding.unwrap_or(if floats { Encoding::Linear } else { Encoding::Srgb });
-    let size = [decoded.width() as usize, decoded.height() as usize];
-    let planes = if decoded.color().has_color() {
-        let pixels = decoded.into_rgb32f().into_raw();
-        (0..3).map(|c| pixels.iter().skip(c).step_by(3).copied().collect()).collect()
-    } else {
-        vec![decoded.to_luma32f().into_raw()]
-    };
-    let image = Image::new(size, planes, encoding).map_err(|e| DiskError::content(path, e.to_string()))?;
-    Ok(vec![Found { image, layer: String::new(), origin: [0, 0] }])
+    let claimed = samples.size[0] as u64 * samples.size[1] as u64 * samples.colors() as u64 * 4;
+    if claimed > MAX_BYTES {
+        return Err(broken(
+            path,
+            &format!("as 32-bit floats it takes {claimed} bytes, at most {MAX_BYTES} can be taken"),
+        ));
+    }
+    let (planes, alpha) = (samples.planes(), samples.alpha());
+    let image = Image::new(samples.size, planes, encoding).map_err(|e| DiskError::content(path, e.to_string()))?;
+    Ok(vec![Found { image, layer: String::new(), origin: [0, 0], alpha }])
+}
+
+impl Samples {
+    /// Channels but for alpha: 1 or 3.
+    fn colors(&self) -> usize {
+        if self.channels < 3 { 1 } else { 3 }
+    }
+
+    /// The colours as planes, integers as shares of their range.
+    fn planes(&self) -> Vec<Vec<f32>> {
+        fn plane<T: Copy>(values: &[T], channels: usize, channel: usize, float: impl Fn(T) -> f32) -> Vec<f32> {
+            values.chunks_exact(channels).map(|pixel| float(pixel[channel])).collect()
+        }
+        let n = self.channels;
+        let one = |c| match &self.values {
+            Values::U8(v) => plane(v, n, c, |code| f32::from(code) / 255.0),
+            Values::U16(v) => plane(v, n, c, |code| f32::from(code) / 65_535.0),
+            Values::F32(v) => plane(v, n, c, |value| value),
+        };
+        (0..self.colors()).map(one).collect()
+    }
+
+    fn alpha(&self) -> Alpha {
+        let n = self.channels;
+        if self.colors() == n {
+            return Alpha::None;
+        }
+        match &self.values {
+            Values::U8(v) => Alpha::of(v.chunks_exact(n).map(|p| p[n - 1] == u8::MAX)),
+            Values::U16(v) => Alpha::of(v.chunks_exact(n).map(|p| p[n - 1] == u16::MAX)),
+            Values::F32(v) => Alpha::of(v.chunks_exact(n).map(|p| p[n - 1] == 1.0)),
+        }
+    }
 }
 
 /// Decodes the bytes of an image as they are stored. OpenEXR has layers, which
@@ -127,7 +182,10 @@ pub fn decode_samples(path: &Path, bytes: &[u8]) -> Result<Samples, DiskError> {
     if is_exr(path, bytes) {
         return Err(DiskError::content(path, "an OpenEXR image has layers, not samples"));
     }
-    let decoded = decode_dynamic(path, bytes)?;
+    let decoded = match reader(path, bytes)? {
+        reader if reader.format() == Some(ImageFormat::Png) => return read_png::decode(path, bytes),
+        reader => decode_dynamic(path, reader)?,
+    };
     let size = [decoded.width() as usize, decoded.height() as usize];
     let channels = usize::from(decoded.color().channel_count());
     let values = match decoded {
@@ -157,7 +215,11 @@ pub fn size(path: &Path, bytes: &[u8]) -> Result<[usize; 2], DiskError> {
     if is_exr(path, bytes) {
         return exr_size(path, bytes);
     }
-    let (width, height) = reader(path, bytes)?.into_dimensions().map_err(|e| broken(path, &e))?;
+    let reader = reader(path, bytes)?;
+    if reader.format() == Some(ImageFormat::Png) {
+        return read_png::size(path, bytes);
+    }
+    let (width, height) = reader.into_dimensions().map_err(|e| broken(path, &e))?;
     with_pixels(path, [width as usize, height as usize])
 }
 
@@ -189,35 +251,38 @@ pub fn is_exr(path: &Path, bytes: &[u8]) -> bool {
         || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) && image::guess_format(bytes).is_err()
 }
 
-/// How many bytes a file may decode to.
-fn most(bytes: &[u8]) -> u64 {
-    (bytes.len() as u64).saturating_mul(MAX_RATIO).clamp(MIN_BYTES, MAX_BYTES)
-}
-
-fn broken(path: &Path, e: &dyn std::fmt::Display) -> DiskError {
+pub(super) fn broken(path: &Path, e: &dyn std::fmt::Display) -> DiskError {
     DiskError::content(path, format!("not a readable image: {e}"))
 }
 
+/// The decoder of what the bytes are, with its limits; [`read_png`] has its own.
 fn reader<'a>(path: &Path, bytes: &'a [u8]) -> Result<ImageReader<Cursor<&'a [u8]>>, DiskError> {
     let mut reader = ImageReader::new(Cursor::new(bytes));
     // The extension stands in where the first bytes say nothing.
-    if let Ok(format) = image::ImageFormat::from_path(path) {
+    if let Ok(format) = ImageFormat::from_path(path) {
         reader.set_format(format);
     }
     let mut reader = reader.with_guessed_format().map_err(|e| broken(path, &e))?;
     let mut limits = Limits::default();
     (limits.max_image_width, limits.max_image_height) = (Some(MAX_SIDE), Some(MAX_SIDE));
-    limits.max_alloc = Some(most(bytes));
+    limits.max_alloc = Some(match reader.format() {
+        Some(ImageFormat::Jpeg) => (bytes.len() as u64).saturating_mul(MAX_RATIO).clamp(JPEG_BYTES, MAX_BYTES),
+        _ => claim::most(bytes.len()),
+    });
     reader.limits(limits);
-    Ok(reader)
+    // Before the decoder sees them: it reads lists before it knows its limits.
+    match tiff_lists::beyond_the_end(bytes).filter(|_| reader.format() == Some(ImageFormat::Tiff)) {
+        Some(tag) => Err(broken(path, &format!("the list of the tag {tag} reaches beyond the end of the file"))),
+        None => Ok(reader),
+    }
 }
 
-/// What decoding a PNG of 7680 x 4320 RGB takes, 19 MB, milliseconds: this 88 to 102, the
+/// What decoding a PNG of 7680 x 4320 RGB takes, 19 MB, milliseconds: `image` 88 to 102, the
 /// crate `png` without checksums 90 to 100, row by row into no image 55 to 61 (the rest
 /// is fresh memory), `zune-png` 172 to 256, `zlib-rs` without undoing filters 94 to 102.
-/// So checksums stay on, and there is no decoder beside `image`'s.
-fn decode_dynamic(path: &Path, bytes: &[u8]) -> Result<DynamicImage, DiskError> {
-    let decoded = reader(path, bytes)?.decode().map_err(|e| broken(path, &e))?;
+/// So checksums stay on, and there is no decoder beside those that `image` has.
+fn decode_dynamic(path: &Path, reader: ImageReader<Cursor<&[u8]>>) -> Result<DynamicImage, DiskError> {
+    let decoded = reader.decode().map_err(|e| broken(path, &e))?;
     with_pixels(path, [decoded.width() as usize, decoded.height() as usize])?;
     Ok(decoded)
 }

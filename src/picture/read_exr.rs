@@ -1,11 +1,12 @@
 //! OpenEXR of any program: several parts, any channel names, data windows anywhere.
 
-use super::read::{Found, LayerChoice, MAX_SIDE};
+use super::read::{Alpha, Found, LayerChoice};
 use crate::{
+    claim,
     disk::DiskError,
     metrics::image::{Encoding, Image},
 };
-use exr::prelude::{MetaData, ReadChannels, ReadLayers};
+use exr::prelude::{ReadChannels, ReadLayers};
 use std::{collections::BTreeMap, io::Cursor, path::Path};
 
 /// The ending of a grey layer's channel, as OpenEXR viewers expect it.
@@ -30,64 +31,41 @@ fn broken(path: &Path, e: &dyn std::fmt::Display) -> DiskError {
     DiskError::content(path, format!("not a readable OpenEXR image: {e}"))
 }
 
-fn meta(path: &Path, bytes: &[u8]) -> Result<MetaData, DiskError> {
-    MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| broken(path, &e))
-}
-
 /// Width and height of the first part, by the header alone.
 pub(super) fn exr_size(path: &Path, bytes: &[u8]) -> Result<[usize; 2], DiskError> {
-    let meta = meta(path, bytes)?;
+    let meta = claim::exr(path, bytes)?;
     let header = meta.headers.first().ok_or_else(|| DiskError::content(path, "the image has no part"))?;
     Ok([header.layer_size.0, header.layer_size.1])
 }
 
 /// Names of the channels of the first part.
 pub(super) fn names(path: &Path, bytes: &[u8]) -> Result<Vec<String>, DiskError> {
-    let first = meta(path, bytes)?.headers.into_iter().next();
+    let first = claim::exr(path, bytes)?.headers.into_iter().next();
     let channels = first.map(|h| h.channels.list).unwrap_or_default();
     Ok(channels.iter().map(|c| c.name.to_string()).map(|n| n.strip_suffix(GREY).unwrap_or(&n).to_owned()).collect())
 }
 
-/// Reads the layers asked for, where the file claims no more than `most` bytes.
+/// Reads the layers asked for.
 pub(super) fn decode(
     path: &Path,
     bytes: &[u8],
     choice: LayerChoice<'_>,
     encoding: Encoding,
-    most: u64,
 ) -> Result<Vec<Found>, DiskError> {
-    check_header(path, bytes, most)?;
+    claim::exr(path, bytes)?;
     let mut channels = Channels::read(path, bytes)?;
     let wanted = match choice {
         LayerChoice::Main => vec![channels.main(path)?],
         LayerChoice::Named(name) => vec![channels.named(path, name)?],
         LayerChoice::All => channels.layers(),
     };
-    wanted.into_iter().map(|names| channels.take(path, &names, encoding)).collect()
-}
-
-/// Refuses what the decoder would allocate too much for, and what it cannot read.
-fn check_header(path: &Path, bytes: &[u8], most: u64) -> Result<(), DiskError> {
-    let mut claimed = 0u64;
-    for header in &meta(path, bytes)?.headers {
-        if header.deep {
-            return Err(DiskError::content(path, "deep OpenEXR images cannot be compared: flatten them"));
-        }
-        let [width, height] = [header.layer_size.0 as u64, header.layer_size.1 as u64];
-        if width.max(height) > u64::from(MAX_SIDE) {
-            let why = format!("the header claims {width} x {height} pixels, at most {MAX_SIDE} a side can be read");
-            return Err(DiskError::content(path, why));
-        }
-        // Samples of 16 bits become 32.
-        let pixel = (header.channels.bytes_per_pixel as u64).max(4 * header.channels.list.len() as u64);
-        claimed = claimed.saturating_add((width * height).saturating_mul(pixel));
-    }
-    if claimed > most {
-        let length = bytes.len();
-        let why = format!("the header claims {claimed} bytes of pixels, more than {length} bytes of file can hold");
-        return Err(DiskError::content(path, why));
-    }
-    Ok(())
+    let all = choice == LayerChoice::All;
+    let take = |names: Vec<String>| {
+        // Where all layers are taken, alpha is one of them.
+        let alpha = if all { Alpha::None } else { channels.alpha(&names) };
+        Ok(Found { alpha, ..channels.take(path, &names, encoding)? })
+    };
+    wanted.into_iter().map(take).collect()
 }
 
 /// The names of the three channels of a colour layer.
@@ -174,6 +152,13 @@ impl Channels {
         layers
     }
 
+    /// Of the channel `A` beside a layer of colours, or beside `Y`.
+    fn alpha(&self, names: &[String]) -> Alpha {
+        let prefix = names.first().and_then(|n| n.strip_suffix(if names.len() == 3 { 'R' } else { 'Y' }));
+        let alpha = prefix.filter(|p| p.is_empty() || p.ends_with('.')).and_then(|p| self.all.get(&format!("{p}A")));
+        alpha.map_or(Alpha::None, |a| Alpha::of(a.values.iter().map(|&v| v == 1.0)))
+    }
+
     fn take(&mut self, path: &Path, names: &[String], encoding: Encoding) -> Result<Found, DiskError> {
         let layer = match names {
             [one] => one.clone(),
@@ -185,6 +170,6 @@ impl Channels {
         let planes = channels.into_iter().map(|c| c.values).collect();
         let image = Image::new(size, planes, encoding)
             .map_err(|e| DiskError::content(path, format!("layer '{layer}': {e}")))?;
-        Ok(Found { image, layer, origin })
+        Ok(Found { image, layer, origin, alpha: Alpha::None })
     }
 }

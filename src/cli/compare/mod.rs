@@ -21,11 +21,13 @@ use std::path::{Path, PathBuf};
 aogauge compare references/ renders/ --fail 'flip<=0.05' --fail 'ssim>=0.98' --warn 'flip.p99<=0.2'\n  \
 aogauge compare references/ renders/ --limits limits.toml --maps maps --format json > compare.json\n  \
 aogauge compare a.png b.png --exact --fail 'differing<=0'\n  \
-aogauge compare a.exr b.exr --all-layers --ignore 0,0,320,40 --diff diff.png\n\n\
+aogauge compare a.png b.png --exact --diff differing.png\n  \
+aogauge compare a.exr b.exr --all-layers --ignore 0,0,320,40 --maps maps\n\n\
 OpenEXR, PNG, JPEG, Radiance HDR and TIFF. docs/compare.md tells how to use it in CI, docs/metrics.md what each\n\
 metric sees and misses. Limits are on mean-error, mae, mse, rmse, psnr, relative-mse, smape, ssim, ms-ssim, flip,\n\
 hdr-flip, differing, largest-difference, and on MAP.STATISTIC, such as flip.p99: of the maps absolute, signed, ssim,\n\
-flip and hdr-flip the statistics mean, min, p1, p5, median, p95, p99 and max.\n\
+flip and hdr-flip the statistics mean, min, p1, p5, median, p95, p99 and max; and on welch.rejected,\n\
+welch.pixels, welch.tiles, welch.image and welch.bias of two images of a record.\n\
 Exit codes: 0 pass or only warnings, 1 a limit is broken or an image is missing, 2 wrong usage or a pair that cannot\n\
 be compared, 4 no image to compare, 6 a metric under a limit has no value.")]
 pub struct Args {
@@ -34,7 +36,7 @@ pub struct Args {
     /// What is compared: an image, or a folder with images of the same relative paths.
     test: PathBuf,
     /// The pixel-exact metric alone: how many pixels differ, and by how much. Fast.
-    #[arg(long, conflicts_with_all = ["maps", "diff", "hdr", "ssimulacra2"])]
+    #[arg(long, conflicts_with_all = ["maps", "hdr", "ssimulacra2"])]
     exact: bool,
     /// A pixel differs where a channel does by more than this, of a range of 0 to 1;
     /// may be a fraction, such as 2/255.
@@ -87,15 +89,49 @@ pub struct Args {
     /// side-by-side.png; of folders, a folder an image.
     #[arg(long, value_name = "DIR")]
     maps: Option<PathBuf>,
-    /// One picture: reference, test image, FLIP map. Of two images.
-    #[arg(long, value_name = "FILE.png")]
-    diff: Option<PathBuf>,
+    /// The difference of two images. FILE.png: one picture of reference, test image and FLIP
+    /// map, or with --exact the pixels that differ in red. FILE.exr: test - reference as
+    /// numbers, a layer a channel.
+    #[arg(long, value_name = "FILE", value_parser = DiffFile::parse)]
+    diff: Option<DiffFile>,
     /// Where the scales of the absolute and the signed map end.
     #[arg(long, default_value_t = 0.25, requires = "maps")]
     scale: f64,
     /// What is printed on standard output.
     #[arg(long, value_enum, default_value_t)]
     format: Format,
+}
+
+/// `--diff`: what is written is told by the extension.
+#[derive(Clone, Debug)]
+enum DiffFile {
+    /// A picture.
+    Picture(PathBuf),
+    /// Numbers.
+    Numbers(PathBuf),
+}
+
+impl DiffFile {
+    fn parse(text: &str) -> Result<Self, String> {
+        let path = PathBuf::from(text);
+        match path.extension().map(|e| e.to_string_lossy().to_lowercase()).as_deref() {
+            Some("png") => Ok(DiffFile::Picture(path)),
+            Some("exr") => Ok(DiffFile::Numbers(path)),
+            _ => {
+                Err("the name must end in .png, for a picture, or in .exr, for the signed difference as numbers"
+                    .to_owned())
+            }
+        }
+    }
+
+    fn write(&self, drawn: &Drawn<'_>) -> Result<(), CompareError> {
+        let path = match self {
+            DiffFile::Numbers(path) => return Ok(drawn.difference.layers().write(path)?),
+            DiffFile::Picture(path) => path,
+        };
+        let picture = drawn.measured.as_ref().map_or_else(|| Ok(drawn.difference.marked()), side_by_side)?;
+        Ok(write_png(path, &picture)?)
+    }
 }
 
 /// `--encoding`
@@ -150,6 +186,7 @@ impl Args {
             tolerance: self.tolerance,
             limits: limits.and(self.fail.clone(), self.warn.clone()),
             allow_missing: self.allow_missing,
+            draw_exact: self.diff.is_some(),
         })
     }
 
@@ -190,13 +227,10 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
         ));
     }
     let mut drawn = |report: &PairReport, drawn: &Drawn<'_>| {
-        if let Some(root) = &args.maps {
-            write_maps(&args.maps_folder(root, report), drawn, args.scale)?;
+        if let (Some(root), Some(measured)) = (&args.maps, &drawn.measured) {
+            write_maps(&args.maps_folder(root, report), measured, args.scale)?;
         }
-        if let Some(file) = &args.diff {
-            write_png(file, &side_by_side(drawn)?)?;
-        }
-        Ok(())
+        args.diff.as_ref().map_or(Ok(()), |file| file.write(drawn))
     };
     let found = if folders {
         let bar = bar();

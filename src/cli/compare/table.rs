@@ -17,6 +17,7 @@ pub(super) fn table(found: &Comparison, many: bool) -> String {
 fn single(pair: &PairReport) -> String {
     let mut text = pair.scores.as_ref().map_or_else(String::new, |s| scores(s) + "\n");
     text += &pair.exact.as_ref().map_or_else(String::new, exact);
+    text += &pair.note.as_ref().map_or_else(String::new, |n| format!("note: {n}\n"));
     text += &welch(pair.welch.as_ref());
     if !pair.limits.is_empty() {
         text += &format!("\n{}\n", pair.outcome.label().to_uppercase());
@@ -47,6 +48,7 @@ fn list(found: &Comparison, pairs: &[PairReport]) -> String {
         text += "\n";
         text += &pair.limits.iter().filter(|l| l.state != LimitState::Holds).map(limit).collect::<String>();
         text += &pair.reason.as_ref().map_or_else(String::new, |r| format!("    {r}\n"));
+        text += &pair.note.as_ref().map_or_else(String::new, |n| format!("    note: {n}\n"));
     }
     text += &found.missing.iter().map(|n| format!("{:<13}{n}\n", "MISSING")).collect::<String>();
     text += &found.new.iter().map(|n| format!("{:<13}{n}\n", "NEW")).collect::<String>();
