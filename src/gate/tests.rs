@@ -403,14 +403,24 @@ fn verdicts_explain_themselves() {
         parts.iter().for_each(|p| assert!(text.contains(p), "{p}: {text}"));
     };
     let v = one(gate(Limit::AtLeast(0.5)), 0.4, 0.01);
-    says(&v, &["Measured is contrast of e on the cpu with 4 rays a pixel in s: K, the mean under", "It is 0.4000"]);
+    says(
+        &v,
+        &[
+            "Measured is contrast of e on the cpu with 4 rays a pixel in s: K, the mean under",
+            "It is 0.400, with a standard error of 0.0100, 15 degrees",
+        ],
+    );
     says(
         &v,
         &["footprint (12 pixels)", "The limit is at least 0.5", "0.100 on the wrong side of it, 10.0 standard errors"],
     );
     says(
         &v,
-        &["By Student's t the p-value is 1 for a limit that holds", "over the 1 verdicts", "in at most 5 % of runs"],
+        &[
+            "by Student's t, small is sure: p = 1 that the limit holds, p = 5.0e-8 that it is broken",
+            "has no other verdict",
+            "below 0.05 decides: at most 5 % of runs",
+        ],
     );
     says(
         &v,
@@ -438,7 +448,7 @@ fn verdicts_explain_themselves() {
     now[0].looks = Some(2);
     says(
         &judged(vec![against.clone()], &now, Some(&base)).0[0],
-        &["That of the base record is 0.5000", "this look may spend 0.152"],
+        &["That of the base record is 0.500.", "it may spend 0.152"],
     );
     let none = record(suite(vec![]), vec![scene("s")], vec![]);
     says(&judged(vec![against], &now, Some(&none)).0[0], &["It cannot be held against the base record.", "Mend what"]);

@@ -138,7 +138,7 @@ fn measured(verdict: &Verdict) -> String {
     text += &match (metric.value, metric.se) {
         (Some(v), Some(0.0)) => format!(" It is {}, the same in every replicate.", value(v, None)),
         (Some(v), Some(se)) => {
-            let df = metric.df.map_or_else(String::new, |df| format!(", {} degrees of freedom", number(df)));
+            let df = metric.df.map_or_else(String::new, |df| format!(", {df:.0} degrees of freedom"));
             let note = metric.note.as_ref().map_or_else(String::new, |n| format!(" ({n})"));
             format!(" It is {}{note}, with a standard error of {}{df}.", value(v, Some(se)), number(se))
         }
@@ -197,24 +197,33 @@ fn evidence(verdict: &Verdict, family: usize) -> Option<String> {
         Limit::Equals { .. } => "two one-sided t tests",
         _ => "Student's t",
     };
+    let alone = format!(
+        "The evidence, by {test}, small is sure: p = {} that the limit holds, p = {} that it is broken.",
+        p_text(holds.raw),
+        p_text(broken.raw)
+    );
     let looks = if verdict.spent < 1.0 {
+        let share = number(verdict.spent);
         format!(
-            " Its case was looked at more than once: this look may spend {} of the error rate, and p counts so much more.",
-            number(verdict.spent)
+            " It is not the first look at the case: it may spend {share} of the error rate, and p counts so much more."
         )
     } else {
         String::new()
     };
+    let corrected = match (family, verdict.spent < 1.0) {
+        (..=1, false) => " The run has no other verdict.".to_owned(),
+        _ => format!(
+            " Over the {family} verdicts of the run, Holm's correction makes that {} and {}.",
+            p_text(holds.adjusted),
+            p_text(broken.adjusted)
+        ),
+    };
+    let alpha = 1.0 - verdict.confidence;
     Some(format!(
-        "By {test} the p-value is {} for a limit that holds and {} for one that is broken; over the {family} verdicts of \
-         the run Holm's correction makes that {} and {}.{looks} What is below {} decides, so that a whole run shows a \
-         false red in at most {} of runs, and a false green likewise.",
-        p_text(holds.raw),
-        p_text(broken.raw),
-        p_text(holds.adjusted),
-        p_text(broken.adjusted),
-        number(1.0 - verdict.confidence),
-        percent(1.0 - verdict.confidence),
+        "{alone}{looks}{corrected} What is below {} decides: at most {} of runs show any false red, and as many any false \
+         green.",
+        (alpha * 1e9).round() / 1e9,
+        percent(alpha),
     ))
 }
 

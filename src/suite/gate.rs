@@ -63,8 +63,8 @@ pub struct GateFile {
     /// The value is at most this.
     #[serde(default, deserialize_with = "finite")]
     pub max: Option<f64>,
-    /// The value equals this, give or take `within`: equivalence by TOST, which
-    /// holds where the 90 % interval lies inside.
+    /// The value equals this, give or take `within`: equivalence, by two one-sided
+    /// tests.
     #[serde(default, deserialize_with = "finite")]
     pub equals: Option<f64>,
     /// The margin of `equals`.
