@@ -4,7 +4,7 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
 
 use aogauge::{
-    gate::{Outcome, Verdict, judge},
+    gate::{Evidence, Outcome, Verdict, judge},
     record::{OLDEST, Record, VERSION},
 };
 use serde_json::Value;
@@ -120,7 +120,7 @@ fn a_run_is_held_against_a_base_and_explains_itself() {
     assert_eq!(record.summary.warnings, 1);
 
     // The record alone is enough to judge it anew.
-    let anew = judge(&record.suite, &record.machine.gpu, &record.scenes, &record.cases, Some(&first));
+    let anew = judge(&Evidence { base: Some(&first), ..Evidence::from(&record) });
     assert_eq!(anew, (record.verdicts.clone(), record.idle_gates.clone()));
     for v in &record.verdicts {
         let picture = v.picture.as_ref().unwrap_or_else(|| panic!("{v:?}"));
@@ -130,11 +130,34 @@ fn a_run_is_held_against_a_base_and_explains_itself() {
         assert!(holds.adjusted >= holds.raw && v.p_broken.is_some() && v.margin.is_some());
     }
     explained(&now);
+    divided(dir.path(), &suite, &base, &record);
 
     // An estimator of other options is not the same estimator, whatever it is called.
     fs::write(&suite, SUITE.replace("receiver_plane = \"clipped\"", "receiver_plane = \"counts\"")).unwrap();
     let (code, text) = run(&suite, &now, &["--base", base.to_str().unwrap()]);
     assert!(code == 6 && text.contains("the estimator 'clipped' has other options than in the base record"), "{text}");
+}
+
+/// Shards have no verdicts; merged, they come to those of the whole run. A filter takes
+/// along what gates hold its cases against.
+fn divided(dir: &Path, suite: &Path, base: &Path, whole: &Record) {
+    let [parts, merged, some] = ["parts", "merged", "some"].map(|n| dir.join(n));
+    let base = base.to_str().unwrap();
+    let (code, text) = run(suite, &parts, &["--shard", "1/2", "--base", base]);
+    assert!(code == 2 && text.contains("--base") && !parts.exists(), "{text}");
+    for shard in ["1/2", "2/2"] {
+        let (code, text) = run(suite, &parts.join(&shard[..1]), &["--seed", "2", "--shard", shard]);
+        assert_eq!(code, 0, "{text}");
+    }
+    let [from, to] = [&parts, &merged].map(|p| p.to_str().unwrap());
+    let (code, _, text) = aogauge(&["merge", from, "--out", to, "--base", base]);
+    assert_eq!(code, 0, "{text}");
+    assert_eq!(Record::read(&merged).unwrap().verdicts, whole.verdicts);
+
+    let (code, text) = run(suite, &some, &["--filter", "clipped"]);
+    assert_eq!(code, 0, "{text}");
+    let better = Record::read(&some).unwrap();
+    assert_eq!(of(&better, "better than classic")[0].outcome, Outcome::Pass, "{text}");
 }
 
 fn explained(record: &Path) {
@@ -205,7 +228,7 @@ fn a_record_of_every_version_since_the_oldest_is_read() {
 #[test]
 fn a_stored_record_is_judged_anew() {
     let record = Record::read(&stored(4)).unwrap();
-    let (verdicts, idle) = judge(&record.suite, &record.machine.gpu, &record.scenes, &record.cases, None);
+    let (verdicts, idle) = judge(&Evidence::from(&record));
     assert_eq!(idle, record.idle_gates);
     for (anew, old) in verdicts.iter().zip(&record.verdicts) {
         assert_eq!((&anew.gate, anew.subject(), anew.outcome), (&old.gate, old.subject(), old.outcome));
