@@ -6,12 +6,14 @@
 //! same suite and seed stands under `timing`.
 
 mod folder;
+pub mod pictures;
+mod version;
 
 pub use folder::RecordFolder;
 
 use crate::{
     disk::{DiskError, read_text},
-    gate::{Outcome, Verdict},
+    gate::{Gate, Outcome, Verdict},
     metrics::{Metric, artifact::Brighter, convergence::Convergence, profile::Curve, regions::Region},
     pooled::Pooled,
     scenes::check_name,
@@ -26,8 +28,11 @@ use std::{
     path::{Component, Path},
 };
 
-/// Version of the record's format. Readers refuse others.
-pub const VERSION: u32 = 3;
+/// Version of the record's format, as it is written.
+pub const VERSION: u32 = 4;
+
+/// The oldest version that is still read.
+pub const OLDEST: u32 = 3;
 
 /// The file that makes a folder a record.
 pub const FILE: &str = "record.json";
@@ -94,6 +99,9 @@ pub struct SuiteInfo {
     pub methods: BTreeMap<String, EstimatorFile>,
     /// The name of the classic estimator.
     pub classic: String,
+    /// Its gates, so that a record can be judged anew; empty in records of version 3.
+    #[serde(default)]
+    pub gates: Vec<Gate>,
 }
 
 /// Where a run ran.
@@ -146,6 +154,9 @@ pub struct Summary {
     pub inconclusive: usize,
     /// Failures that are known and explained.
     pub known_failures: usize,
+    /// Verdicts whose limit holds while the stricter one that warns is broken.
+    #[serde(default)]
+    pub warnings: usize,
     /// Cases rendered.
     pub cases: usize,
     /// Cases that ended with an error.
@@ -163,6 +174,7 @@ impl Summary {
             fail: count(Outcome::Fail),
             inconclusive: count(Outcome::Inconclusive) + idle.iter().filter(|g| !g.excused).count(),
             known_failures: count(Outcome::KnownFailure),
+            warnings: count(Outcome::Warn),
             cases: cases.len(),
             failed_cases: cases.iter().filter(|c| c.error.is_some()).count(),
             failed_judges: scenes.iter().filter(|s| s.judge_error.is_some()).count(),
@@ -179,7 +191,8 @@ pub struct IdleGate {
     /// Why.
     pub reason: String,
     /// Whether that is no fault of the run: there was no GPU for a gate on the
-    /// GPU. A gate that is idle without excuse is inconclusive.
+    /// GPU, or no base record for a gate against it. A gate that is idle without excuse
+    /// is inconclusive.
     pub excused: bool,
 }
 
@@ -345,6 +358,10 @@ pub struct CaseRecord {
     pub hash: Option<String>,
     /// Its metrics.
     pub metrics: Vec<Metric>,
+    /// How often its metrics were computed and looked at while its replicates grew;
+    /// absent where that was once, when all were there.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub looks: Option<u32>,
     /// Its metrics by occluder, where the scene shows two or more.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub occluders: Vec<OccluderMetrics>,
@@ -359,6 +376,7 @@ impl CaseRecord {
             image: None,
             hash: None,
             metrics: vec![],
+            looks: None,
             occluders: vec![],
         }
     }
@@ -396,7 +414,7 @@ impl Record {
     ///
     /// # Errors
     /// Where `record.json` is missing (the run did not finish), malformed, or of
-    /// another version.
+    /// a version that is neither [`VERSION`] nor one since [`OLDEST`].
     pub fn read(folder: &Path) -> Result<Self, DiskError> {
         let path = folder.join(FILE);
         if !path.exists() {
@@ -410,19 +428,7 @@ impl Record {
             return Err(DiskError::content(folder, format!("there is no {FILE} here: {why}")));
         }
         let text = read_text(&path)?;
-        #[derive(Deserialize)]
-        struct Versioned {
-            version: u32,
-        }
-        let malformed = |e: serde_json::Error| DiskError::content(&path, format!("not a record: {e}"));
-        let versioned: Versioned = serde_json::from_str(&text).map_err(malformed)?;
-        if versioned.version != VERSION {
-            return Err(DiskError::content(
-                &path,
-                format!("record version {} is not supported, this tool reads version {VERSION}", versioned.version),
-            ));
-        }
-        let record: Record = serde_json::from_str(&text).map_err(malformed)?;
+        let record = version::parse(&text).map_err(|e| DiskError::content(&path, e))?;
         record.check_names().map_err(|e| DiskError::content(&path, e))?;
         Ok(record)
     }
@@ -438,7 +444,8 @@ impl Record {
         let of_cases = self.cases.iter().filter_map(|c| c.image.as_ref());
         let of_scenes = self.scenes.iter().flat_map(|s| [&s.image, &s.look]);
         let of_judges = self.scenes.iter().filter_map(|s| s.judge.as_ref().map(|j| &j.image));
-        for image in of_cases.chain(of_scenes).chain(of_judges) {
+        let of_verdicts = self.verdicts.iter().filter_map(|v| v.picture.as_ref());
+        for image in of_cases.chain(of_scenes).chain(of_judges).chain(of_verdicts) {
             if !Path::new(image).components().all(|c| matches!(c, Component::Normal(_))) {
                 return Err(format!("the image path '{image}' leads out of the record"));
             }
@@ -452,6 +459,9 @@ impl Record {
         let mut line = format!("{} passed, {} failed, {} inconclusive", s.pass, s.fail, s.inconclusive);
         if s.known_failures > 0 {
             line += &format!(", {} known failures", s.known_failures);
+        }
+        if s.warnings > 0 {
+            line += &format!(", {} warnings", s.warnings);
         }
         if s.failed_cases > 0 {
             line += &format!("; {} of {} cases ended with an error", s.failed_cases, s.cases);

@@ -413,10 +413,22 @@ fn a_record_of_another_version_is_refused() {
     run(&suite, &out, 0, &[]);
     let path = out.join("record.json");
     let current = fs::read_to_string(&path).unwrap();
-    let newer = current.replacen("\"version\": 3", "\"version\": 99", 1);
-    assert_ne!(current, newer);
-    fs::write(&path, newer).unwrap();
-    assert!(expect(2, &["report", text(&out)]).contains("version 99"));
+    for (version, says) in [
+        ("99", "written by a newer aogauge 0.1.0 (record version 99); this one reads versions 3 to 4: update it"),
+        (
+            "2",
+            "written by an older aogauge 0.1.0 (record version 2); this one reads versions 3 to 4: run the suite again",
+        ),
+        ("-1", "not a record"),
+    ] {
+        let other = current.replacen("\"version\": 4", &format!("\"version\": {version}"), 1);
+        assert_ne!(current, other);
+        fs::write(&path, other).unwrap();
+        let message = expect(2, &["report", text(&out)]);
+        assert!(message.contains(says) && message.contains("record.json"), "{message}");
+    }
+    fs::write(&path, "[3]").unwrap();
+    assert!(expect(2, &["report", text(&out)]).contains("not a record"));
     fs::write(&path, "{").unwrap();
     assert!(expect(2, &["report", text(&out)]).contains("record.json"));
 }

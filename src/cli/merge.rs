@@ -2,7 +2,7 @@
 
 use super::{
     Exit, Failure, Format,
-    run::{bar, finish},
+    run::{bar, base, finish},
 };
 use crate::{
     record::RecordFolder,
@@ -27,6 +27,9 @@ pub struct Args {
     /// Where the suite lies now; where the shards had it unless given.
     #[arg(long)]
     suite: Option<String>,
+    /// The folder of an earlier record, for gates `against = "base"`.
+    #[arg(long, value_name = "DIR")]
+    base: Option<PathBuf>,
     /// What is printed on standard output: nothing, or the record.
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -47,6 +50,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     if let Some(filter) = &first.filter {
         plan = plan.only(filter);
     }
+    plan.base = base(args.base.as_deref(), &suite)?;
     let prepared = Prepared::new(&plan)?;
     let folder = RecordFolder::create(&args.out)?;
     let record = shards.merge(&prepared, &folder, &bar())?;

@@ -4,6 +4,7 @@ mod bench;
 mod compare;
 mod composite;
 mod doctor;
+mod explain;
 mod flatland;
 mod golden;
 mod merge;
@@ -60,6 +61,7 @@ enum Verb {
     Compare(compare::Args),
     Composite(composite::Args),
     Report(report::Args),
+    Explain(explain::Args),
     #[command(subcommand)]
     Golden(golden::Verb),
     #[command(subcommand)]
@@ -140,6 +142,7 @@ impl Cli {
             Verb::Compare(args) => compare::execute(&args),
             Verb::Composite(args) => composite::execute(&args),
             Verb::Report(args) => report::execute(&args),
+            Verb::Explain(args) => explain::execute(&args),
             Verb::Golden(verb) => golden::execute(&verb),
             Verb::Scene(verb) => scene::execute(&verb),
             Verb::Flatland(args) => flatland::execute(&args),

@@ -4,6 +4,7 @@ mod dry_run;
 
 use super::{Exit, Failure, Format, json, on_gpu::OnGpu, print, tell};
 use crate::{
+    gate::Gate,
     judge_cache::JudgeCache,
     record::{Machine, Record, RecordFolder},
     render::{
@@ -17,7 +18,10 @@ use crate::{
 };
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::{path::PathBuf, time::Duration};
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 /// Render a suite, measure, judge, and write a record and its report.
 #[derive(Debug, clap::Args)]
@@ -34,6 +38,10 @@ pub struct Args {
     /// Seed of all randomness; the suite's unless given.
     #[arg(long)]
     seed: Option<u32>,
+    /// The folder of an earlier record, for gates `against = "base"`. Of shards, give
+    /// it to merge.
+    #[arg(long, value_name = "DIR", conflicts_with = "shard")]
+    base: Option<PathBuf>,
     /// Who renders.
     #[arg(long, value_enum, default_value_t)]
     renderer: Choice,
@@ -154,6 +162,7 @@ fn prepare(
         Some(_) => Platform::Gpu,
     };
     let mut plan = Plan::new(suite, platform, args.seed);
+    plan.base = base(args.base.as_deref(), suite)?;
     if let Some(filter) = &args.filter {
         plan = plan.only(filter);
         if plan.cases.is_empty() {
@@ -266,6 +275,14 @@ fn end_of_shard(args: &Args, record: &ShardRecord, folder: &RecordFolder) -> Res
     Ok(if failed > 0 || record.incomplete.is_some() { Exit::Incomplete } else { Exit::Pass })
 }
 
+/// The record that gates against the base need.
+pub(super) fn base(folder: Option<&Path>, suite: &Suite) -> Result<Option<Record>, Failure> {
+    if folder.is_some() && !suite.gates.iter().any(Gate::is_against_base) {
+        tell("aogauge: --base is of no use here: no gate of this suite is against base");
+    }
+    Ok(folder.map(Record::read).transpose()?)
+}
+
 /// The GPU, or why there is none. An adapter that lacks what was asked for costs
 /// the cases on it, not those on the CPU.
 fn open(args: &Args) -> Result<(Option<Result<Gpu, RenderError>>, String), Failure> {
@@ -337,6 +354,7 @@ within = 0.001
             suite: String::new(),
             out: dir.path().join("out"),
             seed: None,
+            base: None,
             renderer: Choice::Gpu,
             threads: None,
             filter: None,

@@ -1,6 +1,6 @@
 //! `aogauge schema`
 
-use super::{Exit, Failure, golden, json, print};
+use super::{Exit, Failure, explain::Explanations, golden, json, print};
 use crate::{
     bench::GpuBench, compare::Comparison, flatland::Study, golden::Verification, record::Record, scenes::Scene,
     suite::SuiteFile,
@@ -31,6 +31,8 @@ enum Of {
     Bench,
     /// What `compare --format json` prints.
     Compare,
+    /// What `explain --format json` prints.
+    Explain,
     /// What `golden verify --format json` prints.
     GoldenVerify,
     /// What `golden list --format json` prints.
@@ -46,6 +48,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
         Of::Scene => Scene::file_schema(),
         Of::Flatland => schemars::schema_for!(Study),
         Of::Compare => schemars::schema_for!(Comparison),
+        Of::Explain => schemars::schema_for!(Explanations),
         Of::GoldenVerify => schemars::schema_for!(Verification),
         Of::GoldenList => schemars::schema_for!(golden::Listing),
         Of::GoldenSize => schemars::schema_for!(golden::Sizes),

@@ -14,10 +14,7 @@ use crate::{
 };
 use std::path::Path;
 
-/// Folder of the maps of O - Q within a scene's pictures, and name of their bar.
-pub const MINUS_Q: &str = "minus-q";
-/// The same of the mean at the fewest rays less the converged image.
-pub const MINUS_CONVERGED: &str = "minus-converged";
+pub use crate::record::pictures::{MINUS_CONVERGED, MINUS_Q};
 
 /// How far the scale of O - Q reaches to both sides of 0.
 pub const LIMIT_Q: f64 = 0.5;

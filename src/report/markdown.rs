@@ -5,7 +5,7 @@ use super::{
     error_maps::{self, LIMIT_CONVERGED, LIMIT_Q, MINUS_CONVERGED, MINUS_Q},
     occluders::{self, OccluderCaseRow, OccluderRow},
     pooled::{self, PooledRow},
-    table::{self, Row, detectable_text, outcome_text, plus_minus, subject, value_text},
+    table::{self, Row, detectable_text, outcome_text, plus_minus, value_text},
 };
 use crate::{
     gate::{CONFIDENCE, Outcome},
@@ -16,8 +16,7 @@ use minijinja::{Environment, syntax::SyntaxConfig, value::Serde};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// The folder of the report's pictures, beside it.
-pub const PICTURES: &str = "pictures";
+pub use crate::record::pictures::PICTURES;
 
 /// Everything the template shows.
 #[derive(Serialize)]
@@ -286,9 +285,9 @@ pub fn text(record: &Record) -> Result<String, minijinja::Error> {
         .map(|v| VerdictRow {
             outcome: outcome_text(v.outcome),
             gate: v.gate.clone(),
-            subject: subject(v),
-            metric: v.metric.title(),
-            value: value_text(v.metric.value, v.interval),
+            subject: v.subject(),
+            metric: v.title(),
+            value: value_text(v.value(), v.interval),
             detectable: detectable_text(v.detectable),
             limit: v.limit.text(),
         })

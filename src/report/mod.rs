@@ -17,7 +17,7 @@ use crate::{
     layers::Layers,
     metrics::judge::too_noisy,
     picture::error_map::MapError,
-    record::{Record, SceneRecord},
+    record::{Record, SceneRecord, pictures::MEASURE},
 };
 use std::{collections::BTreeMap, io::Write, path::Path};
 
@@ -98,7 +98,7 @@ fn pictures(folder: &Path, record: &Record, scene: &SceneRecord, out: &Path) -> 
             None => layer(&converged, &scene.image, &format!("converged-{name}"))?,
         };
         let (middle, size) = middle(scene, &values);
-        picture::openness(&middle, size, 4, &out.join("measure").join(format!("{name}.png")))?;
+        picture::openness(&middle, size, 4, &out.join(MEASURE).join(format!("{name}.png")))?;
         shown.insert(name.as_str(), values);
     }
     if let Some(judge) = &scene.judge {

@@ -2,7 +2,7 @@
 //! case that comes closest to its limit.
 
 use crate::{
-    gate::{Limit, Outcome, Verdict},
+    gate::{Outcome, Verdict},
     record::Record,
 };
 use serde::Serialize;
@@ -10,7 +10,7 @@ use serde::Serialize;
 /// A gate with what came of it on all its cases.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// `PASS`, `FAIL`, `INCONCLUSIVE` or `KNOWN FAILURE`: the worst of its cases.
+    /// `PASS`, `FAIL`, `INCONCLUSIVE`, `WARN` or `KNOWN FAILURE`: the worst of its cases.
     pub outcome: &'static str,
     /// The gate.
     pub gate: String,
@@ -34,6 +34,7 @@ pub fn outcome_text(outcome: Outcome) -> &'static str {
         Outcome::Pass => "PASS",
         Outcome::Fail => "FAIL",
         Outcome::Inconclusive => "INCONCLUSIVE",
+        Outcome::Warn => "WARN",
         Outcome::KnownFailure => "KNOWN FAILURE",
     }
 }
@@ -72,21 +73,9 @@ pub fn detectable_text(detectable: Option<f64>) -> String {
     }
 }
 
-/// The case of a verdict, or `scene (judge)`.
-pub fn subject(verdict: &Verdict) -> String {
-    verdict.case.as_ref().map_or_else(|| format!("{} (judge)", verdict.scene), crate::suite::Case::id)
-}
-
 /// How far inside its limit a verdict's value lies; negative outside.
 fn margin(verdict: &Verdict) -> f64 {
-    let Some(value) = verdict.metric.value else {
-        return f64::NEG_INFINITY;
-    };
-    match verdict.limit {
-        Limit::AtLeast(limit) => value - limit,
-        Limit::AtMost(limit) => limit - value,
-        Limit::Equals { target, within } => within - (value - target).abs(),
-    }
+    verdict.value().map_or(f64::NEG_INFINITY, |value| verdict.limit.margin(value))
 }
 
 /// A row a gate, worst outcome first.
@@ -107,8 +96,8 @@ pub fn rows(record: &Record) -> Vec<Row> {
                 outcome: outcome_text(worst),
                 gate: gate.to_owned(),
                 cases: of_gate().count(),
-                nearest: subject(nearest),
-                value: value_text(nearest.metric.value, nearest.interval),
+                nearest: nearest.subject(),
+                value: value_text(nearest.value(), nearest.interval),
                 detectable: detectable_text(nearest.detectable),
                 limit: nearest.limit.text(),
                 reason: (worst != Outcome::Pass).then(|| nearest.reason.clone()),

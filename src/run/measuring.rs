@@ -100,6 +100,7 @@ impl Set<'_> {
                 image: Some(case_image(case)),
                 hash: Some(own.hash.clone()),
                 metrics: metrics(&method, &others),
+                looks: None,
                 occluders: self.by_occluder(index, &method, &classic_on, judged),
             });
         }

@@ -30,12 +30,11 @@ pub use shard::{Shard, ShardRecord};
 pub use stop::Stop;
 
 use crate::{
-    gate::Verdict,
+    gate::{Evidence, judge},
     judge_cache::JudgeCache,
     layers::hex,
-    metrics::{Absent, Metric},
     pooled::pooled,
-    record::{CaseRecord, IdleGate, Machine, Record, RecordFolder, SceneRecord, SuiteInfo, Summary, Timing, VERSION},
+    record::{CaseRecord, Machine, Record, RecordFolder, SceneRecord, SuiteInfo, Summary, Timing, VERSION},
     render::Renderer,
     suite::{Case, EstimatorFile, Plan, Suite},
 };
@@ -193,8 +192,16 @@ impl<'a> Prepared<'a> {
         cases: Vec<CaseRecord>,
     ) -> Record {
         let plan = self.plan;
-        let (verdicts, idle_gates) = verdicts(plan, &machine, &scenes, &cases);
         let suite = suite_info(plan);
+        let evidence = Evidence {
+            suite: &suite,
+            gpu: &machine.gpu,
+            filter: plan.filter.as_deref(),
+            scenes: &scenes,
+            cases: &cases,
+            base: plan.base.as_ref(),
+        };
+        let (verdicts, idle_gates) = judge(&evidence);
         Record {
             version: VERSION,
             tool: env!("CARGO_PKG_VERSION").to_owned(),
@@ -246,52 +253,6 @@ fn suite_info(plan: &Plan<'_>) -> SuiteInfo {
         estimators: methods().map(|m| m.name.clone()).collect(),
         methods: methods().map(|m| (m.name.clone(), EstimatorFile::of(&m.estimator))).collect(),
         classic: suite.methods[suite.classic()].name.clone(),
+        gates: suite.gates.clone(),
     }
-}
-
-/// Holds every gate against every case it applies to. Failures come first.
-fn verdicts(
-    plan: &Plan<'_>,
-    machine: &Machine,
-    scenes: &[SceneRecord],
-    cases: &[CaseRecord],
-) -> (Vec<Verdict>, Vec<IdleGate>) {
-    let (mut verdicts, mut idle) = (Vec::new(), Vec::new());
-    let no_gpu = !plan.cases.iter().any(|c| c.renderer == "gpu");
-    for gate in &plan.suite.gates {
-        let before = verdicts.len();
-        for scene in scenes.iter().filter(|s| gate.applies_to_judge(&s.name)) {
-            let metric = match &scene.judge {
-                Some(judge) => judge.contrast.clone(),
-                None => Metric::new(gate.metric, None, Err(Absent(scene.no_judge.clone().unwrap_or_default()))),
-            };
-            verdicts.push(gate.verdict(&scene.name, None, &metric));
-        }
-        for record in cases.iter().filter(|c| gate.applies_to(&c.case)) {
-            if let Some(metric) = record.metric(gate.metric, gate.region) {
-                verdicts.push(gate.verdict(&record.case.scene, Some(&record.case), metric));
-            }
-        }
-        let excused = no_gpu && !gate.renderers.is_empty() && gate.renderers.iter().all(|r| r == "gpu");
-        if excused {
-            let reason = format!("this run used no GPU: {}", machine.gpu);
-            idle.push(IdleGate { gate: gate.name.clone(), reason, excused });
-        } else if verdicts.len() == before {
-            let reason = match &plan.filter {
-                Some(filter) => format!("no case that was asked for (--filter {filter}) has this metric"),
-                None => "no case of this run has this metric".to_owned(),
-            };
-            idle.push(IdleGate { gate: gate.name.clone(), reason, excused: plan.filter.is_some() });
-        } else {
-            // A scene that the gate names must not drop out of it unseen.
-            for scene in gate.scenes.iter().filter(|_| plan.filter.is_none()) {
-                if !verdicts[before..].iter().any(|v: &Verdict| v.scene == *scene) {
-                    let absent = Absent("no case of this scene has this metric".into());
-                    verdicts.push(gate.verdict(scene, None, &Metric::new(gate.metric, gate.region, Err(absent))));
-                }
-            }
-        }
-    }
-    verdicts.sort_by_key(|v| v.outcome);
-    (verdicts, idle)
 }

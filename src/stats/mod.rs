@@ -14,6 +14,7 @@ mod noise;
 mod random;
 mod regression;
 mod scales;
+mod sequential;
 mod share;
 mod spread;
 mod student;
@@ -33,6 +34,7 @@ pub use regression::{Line, RegressionError, log_log_slope, regress};
 pub use scales::{
     Difference, ImageSample, IndependentPixels, POWER, Replicates, Scale, ScaleTest, TILE, pixel_p_values, three_scales,
 };
+pub use sequential::{decided, spending};
 pub use share::{clopper_pearson, wilson};
 pub use spread::Spread;
 pub use student::{Student, student, student_pooled};

@@ -1,11 +1,7 @@
 //! The suite file.
 
-use super::EstimatorFile;
-use crate::{
-    gate::{Gate, Limit},
-    metrics::{MetricName, regions::Region},
-    scenes::Count,
-};
+use super::{EstimatorFile, GateFile};
+use crate::scenes::Count;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
@@ -118,98 +114,4 @@ pub struct SoftwareAdapter {
     pub scenes: Vec<String>,
     /// Rays a pixel.
     pub rays: Vec<Rays>,
-}
-
-/// A finite limit.
-fn finite<'de, D: Deserializer<'de>>(d: D) -> Result<Option<f64>, D::Error> {
-    let value = f64::deserialize(d)?;
-    if value.is_finite() {
-        Ok(Some(value))
-    } else {
-        Err(D::Error::custom(format!("{value} is no limit: give a finite number")))
-    }
-}
-
-/// `[[gate]]`: a limit on a metric. Filters that are absent or empty let
-/// everything through.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct GateFile {
-    /// What it makes sure of, in a sentence.
-    pub name: String,
-    /// The metric.
-    pub metric: MetricName,
-    /// The region, for metrics that are taken over one.
-    pub region: Option<Region>,
-    /// Scenes it holds for.
-    #[serde(default)]
-    pub scenes: Vec<String>,
-    /// Estimators it holds for.
-    #[serde(default)]
-    pub estimators: Vec<String>,
-    /// Renderers it holds for.
-    #[serde(default)]
-    pub renderers: Vec<String>,
-    /// Ray counts it holds for.
-    #[serde(default)]
-    pub rays: Vec<Rays>,
-    /// The value is at least this.
-    #[serde(default, deserialize_with = "finite")]
-    pub min: Option<f64>,
-    /// The value is at most this.
-    #[serde(default, deserialize_with = "finite")]
-    pub max: Option<f64>,
-    /// The value equals this, give or take `within`: equivalence by TOST, which
-    /// holds where the 90 % interval lies inside.
-    #[serde(default, deserialize_with = "finite")]
-    pub equals: Option<f64>,
-    /// The margin of `equals`.
-    #[serde(default, deserialize_with = "finite")]
-    pub within: Option<f64>,
-    /// Why this gate must fail. It is then shown as a known failure, and passing
-    /// is what fails.
-    pub known_failure: Option<String>,
-}
-
-impl GateFile {
-    pub(super) fn build(&self) -> Result<Gate, String> {
-        let limit = match (self.min, self.max, self.equals, self.within) {
-            (Some(v), None, None, None) => Limit::AtLeast(v),
-            (None, Some(v), None, None) => Limit::AtMost(v),
-            (None, None, Some(target), Some(within)) if within > 0.0 => Limit::Equals { target, within },
-            (None, None, Some(_), Some(_)) => return Err("within must be above 0".into()),
-            _ => return Err("give exactly one limit: min, max, or equals together with within".into()),
-        };
-        if self.known_failure.as_ref().is_some_and(|why| why.trim().is_empty()) {
-            return Err("known_failure must say why it fails".into());
-        }
-        if matches!(self.metric, MetricName::JudgeBias | MetricName::JudgeMae | MetricName::JudgeRmse) {
-            return Err(format!(
-                "{} is reported but never gated: it measures the direction of light more than AO; gate contrast-error",
-                self.metric.label()
-            ));
-        }
-        let needs = matches!(self.metric, MetricName::Openness | MetricName::Bias | MetricName::Mae | MetricName::Rmse);
-        match (needs, self.region) {
-            (true, None) => return Err(format!("{} needs a region", self.metric.label())),
-            (false, Some(_)) => return Err(format!("{} takes no region: it has its own", self.metric.label())),
-            _ => {}
-        }
-        if self.metric == MetricName::JudgeContrast
-            && !(self.estimators.is_empty() && self.renderers.is_empty() && self.rays.is_empty())
-        {
-            return Err("judge-contrast belongs to a scene: filter by scenes only".into());
-        }
-        Ok(Gate {
-            name: self.name.clone(),
-            metric: self.metric,
-            region: self.region,
-            limit,
-            scenes: self.scenes.clone(),
-            estimators: self.estimators.clone(),
-            renderers: self.renderers.clone(),
-            rays: self.rays.iter().map(|r| r.get()).collect(),
-            known_failure: self.known_failure.clone(),
-        })
-    }
 }

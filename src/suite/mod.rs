@@ -2,10 +2,12 @@
 
 mod estimator;
 mod file;
+mod gate;
 mod plan;
 
 pub use estimator::EstimatorFile;
-pub use file::{GateFile, JudgeSettings, Rays, Replicates, SoftwareAdapter, SuiteFile};
+pub use file::{JudgeSettings, Rays, Replicates, SoftwareAdapter, SuiteFile};
+pub use gate::{GateFile, LimitFile};
 pub use plan::{Case, Plan, Platform};
 
 use crate::{
@@ -190,7 +192,7 @@ impl Suite {
             }
             names(&of, &gate.renderers, &mut ["cpu", "gpu"].into_iter(), "renderers")?;
             traced(&of, &gate.rays)?;
-            gates.push(gate.build().map_err(|e| invalid(format!("{of}: {e}")))?);
+            gates.push(gate.build(&methods).map_err(|e| invalid(format!("{of}: {e}")))?);
         }
         Ok(Suite { name: name.to_owned(), file: parsed, scenes, methods, gates })
     }
@@ -231,6 +233,7 @@ fn methods(file: &SuiteFile) -> Result<Vec<Method>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gate::Limit;
 
     #[test]
     fn the_built_in_suites_load() {
@@ -261,6 +264,19 @@ mod tests {
         assert_eq!(with("name = 'screen-space'").unwrap().name, "screen-space");
     }
 
+    fn gate(options: &str) -> String {
+        format!("[[gate]]\nname = 'g'\nmetric = 'contrast'\n{options}")
+    }
+
+    #[test]
+    fn gates_are_read_whole() {
+        let text = gate("max = 0.01\nwarn = { max = 0 }\nagainst = 'base'\nconfidence = 0.99\nrays = [4]");
+        let built = with(&text).unwrap().gates.remove(0);
+        assert_eq!((built.limit, built.warn), (Limit::AtMost(0.01), Some(Limit::AtMost(0.0))));
+        assert!(built.is_against_base() && built.confidence == 0.99 && built.rays == [4]);
+        assert_eq!(with(&gate("max = 1")).unwrap().gates[0].confidence, 0.95);
+    }
+
     #[test]
     fn what_is_wrong_is_named() {
         assert_eq!(with("").unwrap().file.target_rmse, 0.01);
@@ -284,6 +300,29 @@ mod tests {
             ("[[gate]]\nname = 'g'\nmetric = 'judge-mae'\nregion = 'left'\nmax = 0.5", "judge-mae is reported but"),
             ("[[gate]]\nname = 'g'\nmetric = 'judge-rmse'\nregion = 'left'\nmax = 0.5", "judge-rmse is reported but"),
             ("[[gate]]\nname = 'g'\nmetric = 'removed'\nmin = nan", "finite"),
+            (&gate("max = 0.5\nmin = 0.1"), "exactly one limit"),
+            (&gate("max = 0.5\nconfidence = 1.0"), "confidence is 1: it must be 0.5 to 0.999999"),
+            (&gate("max = 0.5\nconfidence = 0.4"), "0.5 to 0.999999"),
+            (&gate("max = 0.5\nconfidence = nan"), "0.5 to 0.999999"),
+            (&gate("max = 0.5\nwarn = { max = 0.6 }"), "warn is at most 0.6, which is not stricter than what fails"),
+            (&gate("max = 0.5\nwarn = { max = 0.5 }"), "not stricter"),
+            (&gate("max = 0.5\nwarn = { min = 0.1 }"), "not stricter"),
+            (&gate("max = 0.5\nwarn = { max = 0.4, min = 0.1 }"), "warn: give exactly one limit"),
+            (&gate("max = 0.5\nwarn = { most = 0.4 }"), "most"),
+            (&gate("max = 0.5\nwarn = { max = 0.4 }\nknown_failure = 'x'"), "exclude each other"),
+            (&gate("max = 0.5\nknown_failure = ' '"), "must say why"),
+            (
+                &gate("max = 0.5\nagainst = 'clasic'"),
+                "'clasic', which the suite does not have; it has classic, and base",
+            ),
+            (&gate("max = 0.5\nagainst = 'classic'\nestimators = ['classic']"), "always equal"),
+            ("[[gate]]\nname = 'g'\nmetric = 'removed'\nmin = 0.5\nagainst = 'classic'", "against classic already"),
+            ("[[gate]]\nname = 'g'\nmetric = 'judge-contrast'\nmin = 0.5\nagainst = 'classic'", "against base only"),
+            (
+                &(gate("max = 0.5\nagainst = 'base'")
+                    + "\n[[estimator]]\nname = 'base'\nkind = 'extended'\nreceiver_plane = 'clipped'"),
+                "rename the estimator",
+            ),
         ] {
             let message = with(extra).unwrap_err().to_string();
             assert!(message.contains(says) && message.contains("x.toml"), "{extra}: {message}");

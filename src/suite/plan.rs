@@ -1,7 +1,7 @@
 //! The cases of a suite on a machine.
 
 use super::Suite;
-use crate::scenes::Scene;
+use crate::{record::Record, scenes::Scene};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -52,6 +52,8 @@ pub struct Plan<'a> {
     /// What the names of cases had to contain, where only some were asked for. The
     /// cases that those are compared with are in the plan, too.
     pub filter: Option<String>,
+    /// The record that gates `against = "base"` are held against; None leaves them idle.
+    pub base: Option<Record>,
 }
 
 impl<'a> Plan<'a> {
@@ -87,21 +89,31 @@ impl<'a> Plan<'a> {
                 }
             }
         }
-        Plan { suite, cases, seed: seed.unwrap_or(suite.file.seed), platform, filter: None }
+        Plan { suite, cases, seed: seed.unwrap_or(suite.file.seed), platform, filter: None, base: None }
     }
 
     /// Keeps the cases whose `scene/estimator/renderer/rays` contains a text, and those
-    /// that they are compared with: classic AO beside them, and the CPU's image beside
-    /// the GPU's.
+    /// that they are compared with: classic AO beside them, the CPU's image beside the
+    /// GPU's, and what gates hold them against.
     pub fn only(mut self, filter: &str) -> Self {
         let mut wanted: Vec<Case> = self.cases.iter().filter(|c| c.id().contains(filter)).cloned().collect();
         for case in wanted.clone() {
             let on_cpu = Case { renderer: "cpu".into(), ..case.clone() };
             wanted.extend([self.suite.classic_beside(&case), self.suite.classic_beside(&on_cpu), on_cpu]);
+            let against = self.suite.gates.iter().filter(|g| g.applies_to(&case)).filter_map(|g| g.against.as_deref());
+            wanted.extend(against.filter_map(|other| self.beside(&case, other)).cloned());
         }
         self.cases.retain(|c| wanted.contains(c));
         self.filter = Some(filter.to_owned());
         self
+    }
+
+    /// The case of another estimator that gates hold a case against: in the same scene on
+    /// the same renderer, of as many rays, else of the most.
+    fn beside(&self, case: &Case, other: &str) -> Option<&Case> {
+        let theirs =
+            self.cases.iter().filter(|c| c.estimator == other && c.scene == case.scene && c.renderer == case.renderer);
+        theirs.max_by_key(|c| (c.rays == case.rays, c.rays))
     }
 
     /// The scenes that have a case, in the suite's order.
