@@ -2,8 +2,8 @@
 
 use super::{Exit, Failure, golden, json, print};
 use crate::{
-    bench::GpuBench, compare::Comparison, flatland::Study, golden::Verification, record::Record, scenes::Scene,
-    suite::SuiteFile,
+    bench::GpuBench, changes::Changes, compare::Comparison, flatland::Study, golden::Verification, record::Record,
+    scenes::Scene, suite::SuiteFile,
 };
 use clap::ValueEnum;
 
@@ -29,8 +29,10 @@ enum Of {
     Flatland,
     /// bench.json
     Bench,
-    /// What `compare --format json` prints.
+    /// What `compare --format json` prints of images.
     Compare,
+    /// What `compare --format json` prints of two records.
+    Changes,
     /// What `golden verify --format json` prints.
     GoldenVerify,
     /// What `golden list --format json` prints.
@@ -46,6 +48,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
         Of::Scene => Scene::file_schema(),
         Of::Flatland => schemars::schema_for!(Study),
         Of::Compare => schemars::schema_for!(Comparison),
+        Of::Changes => schemars::schema_for!(Changes),
         Of::GoldenVerify => schemars::schema_for!(Verification),
         Of::GoldenList => schemars::schema_for!(golden::Listing),
         Of::GoldenSize => schemars::schema_for!(golden::Sizes),
