@@ -6,6 +6,7 @@ mod composite;
 mod doctor;
 mod flatland;
 mod golden;
+mod init;
 mod merge;
 mod on_gpu;
 mod render;
@@ -68,6 +69,7 @@ enum Verb {
     #[command(subcommand)]
     Bench(bench::Verb),
     Doctor(doctor::Args),
+    Init(init::Args),
     Schema(schema::Args),
 }
 
@@ -145,6 +147,7 @@ impl Cli {
             Verb::Flatland(args) => flatland::execute(&args),
             Verb::Bench(verb) => bench::execute(&verb),
             Verb::Doctor(args) => doctor::execute(&args),
+            Verb::Init(args) => init::execute(&args),
             Verb::Schema(args) => schema::execute(&args),
         }
     }
