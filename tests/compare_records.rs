@@ -414,6 +414,9 @@ fn cases_limits_and_times_are_told() {
         (&json!("at least 0.1"), &json!("at least 0.05"))
     );
     found(0, one, &gone, &["--allow-missing"]);
+    let early = edited("early", |r| r["incomplete"] = json!("interrupted <by> hand"));
+    found(5, one, &early, &["--allow-missing"]);
+    assert!(markdown(5, one, &early).contains("tiny: the new run ended early (interrupted &lt;by&gt; hand)\n"));
     let nothing = edited("nothing", |r| items(r, "cases").clear());
     found(5, one, &nothing, &[]);
     found(4, one, &nothing, &["--allow-missing"]);
@@ -443,6 +446,7 @@ fn images_of_records_are_compared_as_folders_where_asked() {
     for (args, says) in [
         (&["--exact"][..], "--exact is for images: to compare those of two records, add --images"),
         (&["--fail", "mae<=1"], "--fail is for images"),
+        (&["--ppd", "40"], "--ppd is for images"),
         (&["--images", "--format", "markdown"], "--format markdown tells of two records"),
     ] {
         let [_, err] = compare(2, one, two, args);

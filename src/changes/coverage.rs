@@ -81,6 +81,7 @@ pub(super) fn settings(base: &Record, new: &Record) -> Vec<Setting> {
         let golden = r.suite.golden_rays.map_or_else(|| "none".to_owned(), |n| n.to_string());
         [
             ("suite", r.suite.name.clone()),
+            ("cases asked for", r.filter.clone().unwrap_or_else(|| "all".to_owned())),
             ("tool", r.tool.clone()),
             ("seed", r.seed.to_string()),
             ("replicates", r.suite.replicates.to_string()),

@@ -57,7 +57,7 @@ fn head(changes: &Changes) -> String {
         Outcome::Pass => "✅ PASS",
     };
     let mut text =
-        format!("{}\n### {sign} · {}: {}\n\n", marker(&changes.suite), cell(&changes.suite), changes.headline());
+        format!("{}\n### {sign} · {}: {}\n\n", marker(&changes.suite), cell(&changes.suite), cell(&changes.headline()));
     text += "| | base | new |\n|---|---|---|\n";
     for [what, base, new] in runs(changes) {
         text += &format!("| {} | {} | {} |\n", cell(&what), cell(&base), cell(&new));

@@ -61,7 +61,7 @@ pub enum Turn {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
-    /// The new record lacks cases or judges of the base.
+    /// The new record lacks cases or judges of the base, or its run ended early.
     Lost,
     /// A verdict got worse.
     Worse,
@@ -93,6 +93,8 @@ pub struct Changes {
     pub outcome: Outcome,
     /// Whether cases that the new record does not have are no loss.
     pub allow_missing: bool,
+    /// Why the new run ended early; null where it did not.
+    pub incomplete: Option<String>,
     /// Counts of verdicts and cases.
     pub summary: Both<Summary>,
     /// Suite, tool, seed, replicates and machine, where they differ.
@@ -121,7 +123,7 @@ pub fn changes(base: &Record, new: &Record, images: Vec<ImageChange>, allow_miss
     let grounds = Grounds::of(base, new);
     let cases = coverage::coverage(base, new);
     let verdicts = verdicts::changed(base, new);
-    let lost = !cases.lost.is_empty() || !cases.lost_judges.is_empty();
+    let lost = new.incomplete.is_some() || !cases.lost.is_empty() || !cases.lost_judges.is_empty();
     let gone = !allow_missing && !cases.gone.is_empty();
     let outcome = if lost || gone {
         Outcome::Lost
@@ -137,6 +139,7 @@ pub fn changes(base: &Record, new: &Record, images: Vec<ImageChange>, allow_miss
         suite: new.suite.name.clone(),
         outcome,
         allow_missing,
+        incomplete: new.incomplete.clone(),
         summary: Both { base: base.summary.clone(), new: new.summary.clone() },
         settings: coverage::settings(base, new),
         metrics: metrics::metrics(base, new, &grounds),
@@ -165,7 +168,8 @@ impl Changes {
         let lost = self.cases.lost.len() + self.cases.lost_judges.len();
         let gone = if self.allow_missing { 0 } else { self.cases.gone.len() };
         let worse = self.turned(Turn::Worse);
-        let mut says = Vec::new();
+        let mut says: Vec<String> =
+            self.incomplete.iter().map(|why| format!("the new run ended early ({why})")).collect();
         for (n, one, many) in [
             (lost, "case or judge ended with an error", "cases or judges ended with an error"),
             (gone, "case is gone", "cases are gone"),

@@ -7,7 +7,7 @@ use super::{
 
 /// Everything that changed, as aligned tables.
 pub fn text(changes: &Changes) -> String {
-    let mut text = format!("{}: {}\n\n", line(&changes.suite), changes.headline());
+    let mut text = format!("{}: {}\n\n", line(&changes.suite), line(&changes.headline()));
     let mut rows = vec![[String::new(), "base".to_owned(), "new".to_owned()].to_vec()];
     rows.extend(runs(changes).into_iter().map(|r| r.to_vec()));
     text += &aligned(&rows);

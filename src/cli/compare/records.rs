@@ -4,6 +4,7 @@ use super::Args;
 use crate::{
     changes::{Outcome, changes, images, markdown, text},
     cli::{Exit, Failure, json, print},
+    metrics::image::DEFAULT_PPD,
     record::{FILE, Record},
 };
 use clap::ValueEnum;
@@ -65,6 +66,7 @@ impl Args {
             ("--ignore", !self.ignore.is_empty()),
             ("--only", !self.only.is_empty()),
             ("--crop", self.crop.is_some()),
+            ("--ppd", self.ppd != DEFAULT_PPD),
             ("--hdr", self.hdr),
             ("--ssimulacra2", self.ssimulacra2),
             ("--maps", self.maps.is_some()),
