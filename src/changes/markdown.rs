@@ -19,7 +19,7 @@ const FAIR: usize = 10;
 ///
 /// ```
 /// assert_eq!(aogauge::changes::marker("thin-occluders"), "<!-- aogauge: thin-occluders -->");
-/// assert_eq!(aogauge::changes::marker("x --><b>"), "<!-- aogauge: x_--___b_ -->");
+/// assert_eq!(aogauge::changes::marker("x --><b>"), "<!-- aogauge: x_--__b_ -->");
 /// ```
 pub fn marker(suite: &str) -> String {
     let legal = |c: char| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' };
