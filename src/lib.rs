@@ -1,6 +1,7 @@
 //! aogauge judges the image quality of ambient-occlusion renderers.
 
 pub mod bench;
+pub mod changes;
 mod claim;
 pub mod cli;
 pub mod compare;

@@ -7,6 +7,7 @@ mod doctor;
 mod explain;
 mod flatland;
 mod golden;
+mod init;
 mod merge;
 mod on_gpu;
 mod render;
@@ -70,6 +71,7 @@ enum Verb {
     #[command(subcommand)]
     Bench(bench::Verb),
     Doctor(doctor::Args),
+    Init(init::Args),
     Schema(schema::Args),
 }
 
@@ -148,6 +150,7 @@ impl Cli {
             Verb::Flatland(args) => flatland::execute(&args),
             Verb::Bench(verb) => bench::execute(&verb),
             Verb::Doctor(args) => doctor::execute(&args),
+            Verb::Init(args) => init::execute(&args),
             Verb::Schema(args) => schema::execute(&args),
         }
     }

@@ -2,8 +2,8 @@
 
 use super::{Exit, Failure, explain::Explanations, golden, json, print};
 use crate::{
-    bench::GpuBench, compare::Comparison, flatland::Study, golden::Verification, record::Record, scenes::Scene,
-    suite::SuiteFile,
+    bench::GpuBench, changes::Changes, compare::Comparison, flatland::Study, golden::Verification, record::Record,
+    scenes::Scene, suite::SuiteFile,
 };
 use clap::ValueEnum;
 
@@ -29,10 +29,12 @@ enum Of {
     Flatland,
     /// bench.json
     Bench,
-    /// What `compare --format json` prints.
+    /// What `compare --format json` prints of images.
     Compare,
     /// What `explain --format json` prints.
     Explain,
+    /// What `compare --format json` prints of two records.
+    Changes,
     /// What `golden verify --format json` prints.
     GoldenVerify,
     /// What `golden list --format json` prints.
@@ -49,6 +51,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
         Of::Flatland => schemars::schema_for!(Study),
         Of::Compare => schemars::schema_for!(Comparison),
         Of::Explain => schemars::schema_for!(Explanations),
+        Of::Changes => schemars::schema_for!(Changes),
         Of::GoldenVerify => schemars::schema_for!(Verification),
         Of::GoldenList => schemars::schema_for!(golden::Listing),
         Of::GoldenSize => schemars::schema_for!(golden::Sizes),

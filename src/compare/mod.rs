@@ -111,7 +111,7 @@ pub enum CompareError {
         path: PathBuf,
     },
     /// A folder is a record.
-    #[error("{} is a record (it has a record.json): compare takes images and folders of images, and compares no records", folder.display())]
+    #[error("{} is a record (it has a record.json): compare it with another record, or a folder of images with a folder of images", folder.display())]
     Record {
         /// The folder.
         folder: PathBuf,

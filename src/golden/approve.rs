@@ -67,7 +67,10 @@ pub(super) fn definition(record: &Record, estimator: &str) -> String {
 }
 
 /// A case's image out of its record. Smoothing makes pixels depend on each other.
-pub(super) fn sampled(folder: &Path, record: &Record, case: &CaseRecord) -> Result<Sampled, DiskError> {
+///
+/// # Errors
+/// Where the image cannot be read or lacks a layer.
+pub fn sampled(folder: &Path, record: &Record, case: &CaseRecord) -> Result<Sampled, DiskError> {
     let path = folder.join(case.image.as_deref().unwrap_or_default());
     let method = record.suite.methods.get(&case.case.estimator);
     let depends = method.is_some_and(|m| m.temporal.is_some() || m.denoise.is_some());

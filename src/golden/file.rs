@@ -176,8 +176,8 @@ impl Golden {
     }
 }
 
-/// The region masks among layers.
-pub(super) fn regions(layers: &Layers) -> BTreeMap<Region, Vec<usize>> {
+/// The region masks among layers, a list of pixels each; not that of all pixels.
+pub fn regions(layers: &Layers) -> BTreeMap<Region, Vec<usize>> {
     let kept = Region::ALL.into_iter().filter(|r| *r != Region::All);
     kept.filter_map(|region| {
         let mask = layers.get(&format!("region-{}", region.label()))?;

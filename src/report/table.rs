@@ -40,7 +40,7 @@ pub fn outcome_text(outcome: Outcome) -> &'static str {
 }
 
 /// The digits after the point that an interval of this half width earns.
-fn digits(half: f64) -> usize {
+pub(crate) fn digits(half: f64) -> usize {
     if half > 0.0 { (1.0 - half.log10().floor()).clamp(2.0, 6.0) as usize } else { 4 }
 }
 

@@ -1,8 +1,9 @@
 //! `aogauge compare`
 
+mod records;
 mod table;
 
-use super::{Exit, Failure, Format, json, print, run::bar, tell};
+use super::{Exit, Failure, json, print, run::bar, tell};
 use crate::{
     compare::{
         CompareError, Drawn, Layer, Limit, Limits, Mask, Mode, Outcome, PairReport, Rect, Region, Settings, compare,
@@ -13,28 +14,36 @@ use crate::{
     run::Observer,
 };
 use clap::ValueEnum;
+use records::Printed;
 use std::path::{Path, PathBuf};
 
-/// Compare an image, or a folder of images, with a reference of the same view.
+/// Compare an image, a folder of images or a record with what it should be or was.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  aogauge compare reference.png test.png\n  \
 aogauge compare references/ renders/ --fail 'flip<=0.05' --fail 'ssim>=0.98' --warn 'flip.p99<=0.2'\n  \
 aogauge compare references/ renders/ --limits limits.toml --maps maps --format json > compare.json\n  \
 aogauge compare a.png b.png --exact --fail 'differing<=0'\n  \
 aogauge compare a.png b.png --exact --diff differing.png\n  \
-aogauge compare a.exr b.exr --all-layers --ignore 0,0,320,40 --maps maps\n\n\
+aogauge compare a.exr b.exr --all-layers --ignore 0,0,320,40 --maps maps\n  \
+aogauge compare base/ reports/latest/ --format markdown > comment.md\n\n\
 OpenEXR, PNG, JPEG, Radiance HDR and TIFF. docs/compare.md tells how to use it in CI, docs/metrics.md what each\n\
 metric sees and misses. Limits are on mean-error, mae, mse, rmse, psnr, relative-mse, smape, ssim, ms-ssim, flip,\n\
 hdr-flip, differing, largest-difference, and on MAP.STATISTIC, such as flip.p99: of the maps absolute, signed, ssim,\n\
 flip and hdr-flip the statistics mean, min, p1, p5, median, p95, p99 and max; and on welch.rejected,\n\
 welch.pixels, welch.tiles, welch.image and welch.bias of two images of a record.\n\
 Exit codes: 0 pass or only warnings, 1 a limit is broken or an image is missing, 2 wrong usage or a pair that cannot\n\
-be compared, 4 no image to compare, 6 a metric under a limit has no value.")]
+be compared, 4 no image to compare, 6 a metric under a limit has no value.\n\
+Of two records (folders with a record.json): what changed of verdicts, metrics, images and times; 0 no verdict got\n\
+worse, 1 one did, 2 a record cannot be read, 4 no case in common, 5 cases are lost.")]
 pub struct Args {
-    /// What to compare with: an image, or a folder of images.
+    /// What to compare with: an image, a folder of images, or a record.
     reference: PathBuf,
-    /// What is compared: an image, or a folder with images of the same relative paths.
+    /// What is compared: an image, a folder with images of the same relative paths, or a
+    /// record.
     test: PathBuf,
+    /// Compare the images of two records as folders of images.
+    #[arg(long)]
+    images: bool,
     /// The pixel-exact metric alone: how many pixels differ, and by how much. Fast.
     #[arg(long, conflicts_with_all = ["maps", "hdr", "ssimulacra2"])]
     exact: bool,
@@ -51,7 +60,7 @@ pub struct Args {
     /// A TOML file of limits, with overrides for some paths.
     #[arg(long, value_name = "FILE")]
     limits: Option<PathBuf>,
-    /// Images that the test folder lacks do not fail.
+    /// Images that the test folder lacks, or cases that the record lacks, do not fail.
     #[arg(long)]
     allow_missing: bool,
     /// The layer of OpenEXR images; R, G and B, else Y, else mean unless given.
@@ -99,7 +108,7 @@ pub struct Args {
     scale: f64,
     /// What is printed on standard output.
     #[arg(long, value_enum, default_value_t)]
-    format: Format,
+    format: Printed,
 }
 
 /// `--diff`: what is written is told by the extension.
@@ -217,8 +226,12 @@ fn file_name(layer: &str) -> String {
     name
 }
 
-/// Compares two images or two folders.
+/// Compares two images, two folders or two records.
 pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
+    if args.as_records() {
+        return records::execute(args);
+    }
+    let [reference, test] = args.as_images()?;
     let settings = args.settings()?;
     let folders = args.reference.is_dir();
     if args.diff.is_some() && (folders || args.all_layers) {
@@ -234,19 +247,13 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     };
     let found = if folders {
         let bar = bar();
-        compare(
-            &args.reference,
-            &args.test,
-            &settings,
-            &|done, of, what| bar.step(done as u64, of as u64, what),
-            &mut drawn,
-        )
+        compare(&reference, &test, &settings, &|done, of, what| bar.step(done as u64, of as u64, what), &mut drawn)
     } else {
-        compare(&args.reference, &args.test, &settings, &|_, _, _| {}, &mut drawn)
+        compare(&reference, &test, &settings, &|_, _, _| {}, &mut drawn)
     }?;
     match args.format {
-        Format::Text => print(&table::table(&found, folders || args.all_layers))?,
-        Format::Json => print(&json(&found)?)?,
+        Printed::Json => print(&json(&found)?)?,
+        _ => print(&table::table(&found, folders || args.all_layers))?,
     }
     table::warnings(&found).iter().for_each(|w| tell(w));
     Ok(match found.outcome {
