@@ -362,6 +362,9 @@ pub struct CaseRecord {
     /// absent where that was once, when all were there.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub looks: Option<u32>,
+    /// Replicates in its image; the suite's where absent.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub replicates: Option<u32>,
     /// Its metrics by occluder, where the scene shows two or more.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub occluders: Vec<OccluderMetrics>,
@@ -377,6 +380,7 @@ impl CaseRecord {
             hash: None,
             metrics: vec![],
             looks: None,
+            replicates: None,
             occluders: vec![],
         }
     }
@@ -451,6 +455,11 @@ impl Record {
             }
         }
         Ok(())
+    }
+
+    /// Replicates in the image of a case.
+    pub fn replicates(&self, case: &CaseRecord) -> u32 {
+        case.replicates.unwrap_or(self.suite.replicates)
     }
 
     /// Text for people: `5 passed, 1 failed, ...`.

@@ -282,7 +282,7 @@ fn a_killed_run_leaves_no_record() {
         .spawn()
         .unwrap();
     let start = Instant::now();
-    while !out.join("images").exists() {
+    while !out.join(".aogauge-run/plan.txt").exists() {
         assert!(start.elapsed() < Duration::from_secs(60), "the run never began");
         std::thread::sleep(Duration::from_millis(5));
     }

@@ -37,14 +37,12 @@ pub struct Times {
 
 pub(super) fn times(base: &Record, new: &Record) -> Times {
     let (old, mut found) = (by_id(base), Times { compared: 0, seconds: Both { base: 0.0, new: 0.0 }, changed: vec![] });
-    // A run of more replicates takes longer.
-    let scale = f64::from(new.suite.replicates.max(1)) / f64::from(base.suite.replicates.max(1));
     for case in new.cases.iter().filter(|c| c.error.is_none()) {
         let id = case.case.id();
         let (Some(was), Some(is)) = (base.timing.cases.get(&id), new.timing.cases.get(&id)) else { continue };
-        if old.get(&id).is_none_or(|c| c.error.is_some()) {
-            continue;
-        }
+        let Some(before) = old.get(&id).filter(|c| c.error.is_none()) else { continue };
+        // More replicates take longer.
+        let scale = f64::from(new.replicates(case).max(1)) / f64::from(base.replicates(before).max(1));
         found.compared += 1;
         found.seconds = Both { base: found.seconds.base + was, new: found.seconds.new + is };
         let expected = was * scale;

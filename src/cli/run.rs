@@ -20,7 +20,7 @@ use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::{
     path::{Path, PathBuf},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 /// Render a suite, measure, judge, and write a record and its report.
@@ -55,6 +55,17 @@ pub struct Args {
     /// Kubernetes, GitHub Actions or AOGAUGE_SHARD say.
     #[arg(long, value_name = "K/N")]
     shard: Option<String>,
+    /// Begin with 4 replicates, and add to them where a verdict is not decided yet. The
+    /// error level is kept. Clear cases end early, others go beyond the suite's replicates.
+    #[arg(long)]
+    until_sure: bool,
+    /// The most replicates of a case with --until-sure; four times the suite's unless given.
+    #[arg(long, requires = "until_sure", value_parser = clap::value_parser!(u32).range(2..=1024))]
+    max_replicates: Option<u32>,
+    /// With --until-sure, add no replicates after so many seconds. What is decided then
+    /// depends on how fast the machine is.
+    #[arg(long, requires = "until_sure", value_name = "SECONDS", value_parser = seconds)]
+    max_time: Option<Duration>,
     /// End the run at the first case that fails.
     #[arg(long)]
     fail_fast: bool,
@@ -163,6 +174,8 @@ fn prepare(
     };
     let mut plan = Plan::new(suite, platform, args.seed);
     plan.base = base(args.base.as_deref(), suite)?;
+    let most = args.max_replicates.unwrap_or_else(|| suite.file.replicates.get().saturating_mul(4).min(1024));
+    plan.until_sure = args.until_sure.then_some(most);
     if let Some(filter) = &args.filter {
         plan = plan.only(filter);
         if plan.cases.is_empty() {
@@ -189,6 +202,7 @@ fn prepare(
         cache: cache.as_ref(),
         stop,
         case_timeout: args.case_timeout,
+        until: args.max_time.and_then(|t| Instant::now().checked_add(t)),
         fail_fast: args.fail_fast,
         ..Means::new(&Cpu, machine)
     };
@@ -359,6 +373,9 @@ within = 0.001
             threads: None,
             filter: None,
             shard: None,
+            until_sure: false,
+            max_replicates: None,
+            max_time: None,
             fail_fast: false,
             case_timeout: None,
             dry_run: false,

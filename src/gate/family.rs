@@ -54,8 +54,8 @@ impl<'a> From<&'a Record> for Evidence<'a> {
 /// (the reverse), and what would warn. So for each level alpha the chance that any
 /// gate of that alpha or a smaller one is wrongly red is at most alpha, in the whole
 /// run; and so for green. A p-value from look k of several is first divided by
-/// [`spending`](crate::stats::spending)(k); a difference of two cases with looks by
-/// both, since either may have been looked at with any look of the other.
+/// [`spending`](crate::stats::spending)(k); a difference from a base record with looks
+/// of its own by both, since either may have been looked at with any look of the other.
 pub fn judge(evidence: &Evidence<'_>) -> (Vec<Verdict>, Vec<IdleGate>) {
     let Evidence { suite, gpu, filter, scenes, cases, base } = *evidence;
     let run = Run { parts: Parts { suite, scenes, cases }, base: base.map(Parts::from), gpu, filter };
@@ -154,7 +154,10 @@ impl<'a> Run<'a> {
         let mut spent = share(case.and_then(|c| c.looks));
         let other = self.parts.other(self.base.as_ref(), gate, scene, case.map(|c| &c.case), &metric);
         let other = other.map(|(other, looks)| {
-            spent *= share(looks);
+            // Two cases of one run are looked at together, the k-th time both.
+            if gate.is_against_base() || looks != case.and_then(|c| c.looks) {
+                spent *= share(looks);
+            }
             other
         });
         Draft { gate, scene, case, metric, other, spent }

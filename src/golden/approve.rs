@@ -74,7 +74,7 @@ pub fn sampled(folder: &Path, record: &Record, case: &CaseRecord) -> Result<Samp
     let path = folder.join(case.image.as_deref().unwrap_or_default());
     let method = record.suite.methods.get(&case.case.estimator);
     let depends = method.is_some_and(|m| m.temporal.is_some() || m.denoise.is_some());
-    Sampled::of_layers(&path, record.suite.replicates, case.case.rays, record.seed, depends)
+    Sampled::of_layers(&path, record.replicates(case), case.case.rays, record.seed, depends)
 }
 
 impl Store {
@@ -150,7 +150,7 @@ fn golden_of(folder: &Path, record: &Record, case: &CaseRecord, approval: &Appro
             device: device.clone(),
             tool: record.tool.clone(),
             seed: record.seed,
-            replicates: record.suite.replicates,
+            replicates: record.replicates(case),
             pixel_hash: pixel_hash(&image.mean),
             reason: approval.reason.to_owned(),
         },

@@ -108,10 +108,11 @@ fn time_of(rays: f64, times: &[(f64, f64)]) -> Option<f64> {
 
 /// Time of one replicate.
 fn seconds(record: &Record, scene: &SceneRecord, c: &Convergence, rays: u32) -> Option<f64> {
-    let case = record.cases.iter().map(|r| &r.case).find(|case| {
+    let found = record.cases.iter().find(|r| {
+        let case = &r.case;
         case.scene == scene.name && case.estimator == c.estimator && case.renderer == c.renderer && case.rays == rays
     })?;
-    Some(record.timing.cases.get(&case.id())? / f64::from(record.suite.replicates))
+    Some(record.timing.cases.get(&found.case.id())? / f64::from(record.replicates(found)))
 }
 
 /// `value ± half width`, or a dash. Small numbers keep two digits that count.

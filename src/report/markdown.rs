@@ -160,7 +160,7 @@ fn case_row(record: &Record, case: &CaseRecord, has_judge: bool) -> CaseRow {
         rmse: get(MetricName::Rmse, Some(error_region)),
         over_darkening: get(MetricName::OverDarkening, None),
         milliseconds: pixels
-            .map_or_else(|| "–".to_owned(), |s| format!("{:.1}", s * 1e3 / f64::from(record.suite.replicates))),
+            .map_or_else(|| "–".to_owned(), |s| format!("{:.1}", s * 1e3 / f64::from(record.replicates(case)))),
     }
 }
 

@@ -16,6 +16,39 @@ use crate::{
     suite::Case,
 };
 
+use std::collections::BTreeMap;
+
+/// How many replicates each case is measured from.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Counts {
+    /// By the case's id: replicates, and the look that it was.
+    of: BTreeMap<String, (u32, u32)>,
+    /// For all others.
+    every: Option<u32>,
+}
+
+impl Counts {
+    /// The same of all.
+    pub fn all(replicates: u32) -> Self {
+        Counts { of: BTreeMap::new(), every: Some(replicates) }
+    }
+
+    /// Replicates at a look.
+    pub fn set(&mut self, case: &Case, replicates: u32, look: u32) {
+        self.of.insert(case.id(), (replicates, look));
+    }
+
+    /// The replicates of a case; 0 where it is not rendered.
+    pub fn replicates(&self, case: &Case) -> u32 {
+        self.of.get(&case.id()).map(|(n, _)| *n).or(self.every).unwrap_or(0)
+    }
+
+    /// Which look it was, where there can be several.
+    fn look(&self, case: &Case) -> Option<u32> {
+        self.of.get(&case.id()).map(|(_, look)| *look)
+    }
+}
+
 /// What is said of a case that the run did not come to.
 pub(super) const NOT_RENDERED: &str = "the run ended before it was rendered";
 
@@ -26,22 +59,27 @@ impl Set<'_> {
         &self,
         folder: &RecordFolder,
         rendered: &Rendered,
+        counts: &Counts,
     ) -> Result<(Option<SceneRecord>, Vec<CaseRecord>), RunError> {
-        let count = |_: &Case| self.plan.suite.file.replicates.get();
         let missing = match &rendered.look {
             Some(Err(why)) => Some(format!("the scene's pictures could not be rendered: {why}")),
             None => Some(NOT_RENDERED.to_owned()),
             Some(Ok(())) => None,
         };
-        let short = self.plan.methods().iter().any(|m| !rendered.truths.contains_key(m))
-            || (self.twin.is_some() && rendered.judge.is_none());
+        let short = !self.is_ready(rendered);
         if let Some(why) = missing.or_else(|| short.then(|| NOT_RENDERED.to_owned())) {
             return Ok((None, self.cases().map(|c| CaseRecord::failed(c, why.clone())).collect()));
         }
         let judged = self.judge(folder, rendered)?;
-        let cases = self.case_records(rendered, &judged, &count);
-        let scene = self.scene_record(folder, rendered, judged, &count)?;
+        let cases = self.case_records(rendered, &judged, counts);
+        let scene = self.scene_record(folder, rendered, judged, counts)?;
         Ok((Some(scene), cases))
+    }
+
+    /// Whether everything is there that cases are measured with.
+    pub(super) fn is_ready(&self, rendered: &Rendered) -> bool {
+        self.plan.methods().iter().all(|m| rendered.truths.contains_key(m))
+            && (self.twin.is_none() || rendered.judge.is_some())
     }
 
     /// The judge of the pixels that a method is measured on.
@@ -53,20 +91,21 @@ impl Set<'_> {
         judged.usable.clone().map(|()| &judged.judge.regions)
     }
 
-    /// What was found in each case, from the first `count` replicates of its images.
+    /// What was found in each case, from the first so many replicates of its images.
     pub(super) fn case_records(
         &self,
         rendered: &Rendered,
         judged: &Result<Judged, Unjudged>,
-        count: &dyn Fn(&Case) -> u32,
+        counts: &Counts,
     ) -> Vec<CaseRecord> {
         let classic = &self.plan.suite.methods[self.plan.suite.classic()].name;
-        let images = |case: &Case| rendered.replicates(case, count);
+        let images = |case: &Case| rendered.replicates(case, counts);
         let truth = |case: &Case| rendered.truths.get(&self.method(case));
         let mut records = Vec::new();
         for case in self.cases() {
             let index = self.method(case);
             let own = match (rendered.images.get(&case.id()), truth(case)) {
+                (Some(Ok(_)), _) if counts.replicates(case) == 0 => Err(NOT_RENDERED.to_owned()),
                 (Some(Ok(own)), Some(Truth { converged, fault: None })) => Ok((own, converged)),
                 (Some(Err(e)), _) => Err(e.clone()),
                 (_, Some(Truth { fault: Some(e), .. })) => Err(format!("its converged image cannot be used: {e}")),
@@ -100,7 +139,8 @@ impl Set<'_> {
                 image: Some(case_image(case)),
                 hash: Some(own.hash.clone()),
                 metrics: metrics(&method, &others),
-                looks: None,
+                replicates: Some(own.replicates.len() as u32),
+                looks: counts.look(case),
                 occluders: self.by_occluder(index, &method, &classic_on, judged),
             });
         }

@@ -59,6 +59,7 @@ impl Shards {
                 ("seed", shard.seed != one.seed),
                 ("suite", shard.suite != one.suite),
                 ("filter", shard.filter != one.filter),
+                ("way to go on until sure", shard.until_sure != one.until_sure),
                 ("platform", shard.platform != one.platform),
                 ("GPU", shard.machine.gpu != one.machine.gpu && shard.identity != one.identity),
                 ("content of the suite or of a scene", shard.identity != one.identity),

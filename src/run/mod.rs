@@ -22,6 +22,7 @@ mod set;
 mod shard;
 mod stop;
 mod unit;
+mod until_sure;
 
 pub use error::RunError;
 pub use merge::{MergeError, Shards, find as find_shards};
@@ -62,6 +63,9 @@ pub struct Means<'a> {
     pub stop: Stop,
     /// A case that takes longer ends with an error. It is looked at between replicates.
     pub case_timeout: Option<Duration>,
+    /// When no replicates are added any more where a plan goes on until it is sure. What
+    /// then comes of it depends on the machine's speed.
+    pub until: Option<Instant>,
     /// Whether the first case that fails ends the run.
     pub fail_fast: bool,
     /// Whether all images are there, and a missing one is an error.
@@ -78,6 +82,7 @@ impl<'a> Means<'a> {
             machine,
             stop: Stop::default(),
             case_timeout: None,
+            until: None,
             fail_fast: false,
             is_merge: false,
         }
@@ -134,7 +139,7 @@ impl<'a> Prepared<'a> {
         let cases: Vec<String> = plan.cases.iter().map(Case::id).collect();
         let all = serde_json::json!({
             "tool": env!("CARGO_PKG_VERSION"), "suite": plan.suite.name, "file": plan.suite.file, "scenes": scenes,
-            "cases": cases, "seed": plan.seed, "filter": plan.filter, "gpu": gpu,
+            "cases": cases, "seed": plan.seed, "filter": plan.filter, "gpu": gpu, "until-sure": plan.until_sure,
         });
         hex(&Sha256::digest(all.to_string()))
     }
@@ -156,7 +161,6 @@ impl<'a> Prepared<'a> {
 
     /// Renders what is missing, and measures all.
     fn found(&self, means: &Means<'_>, folder: &RecordFolder, observer: &dyn Observer) -> Result<Record, RunError> {
-        let plan = self.plan;
         let start = Instant::now();
         let mut timing = timing();
         let progress = Progress::new(observer, self.cost(None));
@@ -165,9 +169,9 @@ impl<'a> Prepared<'a> {
         for set in &self.sets {
             let studio = Studio { set, means, journal: Journal { folder }, progress: &progress };
             let mut rendered = Rendered::default();
-            studio.render(&set.units(), plan.suite.file.replicates.get(), &mut rendered)?;
+            let counts = studio.scene(&mut rendered)?;
             rendered.note(&set.scene.name, &mut timing);
-            let (scene, records) = set.measure(folder, &rendered)?;
+            let (scene, records) = set.measure(folder, &rendered, &counts)?;
             scenes.extend(scene);
             let failed = records.iter().find(|c| c.error.as_deref().is_some_and(|e| e != NOT_RENDERED));
             if let Some(case) = failed.filter(|_| means.fail_fast && !means.stop.is_asked()) {
@@ -221,10 +225,12 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// The units of a scene; of a shard its own part.
+/// The units of a scene; of a shard its own part. Where a run goes on until it is sure, what
+/// decides must be together, and a shard takes whole scenes.
 fn mine<'a>(set: &Set<'a>, shard: Option<Shard>) -> Vec<Unit<'a>> {
-    let is_mine =
-        |unit: &Unit<'a>| shard.is_none_or(|s| shard_of(&unit.id(set.plan, &set.scene.name), s.of) == s.index - 1);
+    let name = &set.scene.name;
+    let key = |unit: &Unit<'a>| if set.plan.until_sure.is_some() { name.clone() } else { unit.id(set.plan, name) };
+    let is_mine = |unit: &Unit<'a>| shard.is_none_or(|s| shard_of(&key(unit), s.of) == s.index - 1);
     set.units().into_iter().filter(is_mine).collect()
 }
 

@@ -4,6 +4,7 @@ use super::{
     RunError,
     journal::look_image,
     judging::{Judged, Unjudged},
+    measuring::Counts,
     rendering::Rendered,
     set::{Set, measured},
 };
@@ -27,7 +28,7 @@ impl Set<'_> {
         folder: &RecordFolder,
         rendered: &Rendered,
         judged: Result<Judged, Unjudged>,
-        count: &dyn Fn(&Case) -> u32,
+        counts: &Counts,
     ) -> Result<SceneRecord, RunError> {
         let methods = &self.plan.suite.methods;
         let pixels = self.view.pixels();
@@ -56,7 +57,7 @@ impl Set<'_> {
         let mut profiles: Vec<profile::Curve> = self
             .cases()
             .filter(|c| c.renderer == "cpu" && c.rays == most(self.method(c)))
-            .filter_map(|c| Some(profile::of_method(&c.estimator, rendered.replicates(c, count)?, width as usize)))
+            .filter_map(|c| Some(profile::of_method(&c.estimator, rendered.replicates(c, counts)?, width as usize)))
             .collect();
         let (judge, no_judge, judge_error) = match judged {
             Ok(judged) => {
@@ -85,7 +86,7 @@ impl Set<'_> {
             no_judge,
             judge_error,
             occluders,
-            convergence: self.convergence(rendered, count),
+            convergence: self.convergence(rendered, counts),
             profiles,
             image,
             look: look_image(&self.scene.name),
@@ -94,7 +95,7 @@ impl Set<'_> {
 
     /// How each method converges on each renderer: over all pixels, and over the
     /// footprint where there is one.
-    fn convergence(&self, rendered: &Rendered, count: &dyn Fn(&Case) -> u32) -> Vec<Convergence> {
+    fn convergence(&self, rendered: &Rendered, counts: &Counts) -> Vec<Convergence> {
         let mut keys: Vec<(&str, &str)> = Vec::new();
         for case in self.cases() {
             let key = (case.estimator.as_str(), case.renderer.as_str());
@@ -107,7 +108,7 @@ impl Set<'_> {
             let of_key = |c: &&Case| c.estimator == estimator && c.renderer == renderer;
             let Some(index) = self.cases().find(of_key).map(|c| self.method(c)) else { continue };
             let Some(truth) = rendered.truths.get(&index) else { continue };
-            let level = |c: &Case| Some(Level { rays: c.rays, replicates: rendered.replicates(c, count)? });
+            let level = |c: &Case| Some(Level { rays: c.rays, replicates: rendered.replicates(c, counts)? });
             let levels: Vec<Level<'_>> = self.cases().filter(of_key).filter_map(level).collect();
             let regions = self.regions(index);
             for region in [Region::All, Region::Footprint] {

@@ -4,6 +4,7 @@
 use super::{
     Means, Progress,
     journal::{self, Done, Journal},
+    measuring::Counts,
     set::Set,
     stop::Halt,
     unit::{CONVERGED_REPLICATES, Unit},
@@ -433,9 +434,9 @@ impl Studio<'_> {
 
 impl Rendered {
     /// The first so many replicates of a case.
-    pub fn replicates(&self, case: &Case, count: &dyn Fn(&Case) -> u32) -> Option<&[Vec<f32>]> {
+    pub fn replicates(&self, case: &Case, counts: &Counts) -> Option<&[Vec<f32>]> {
         let all = &self.images.get(&case.id())?.as_ref().ok()?.replicates;
-        all.get(..(count(case) as usize).min(all.len()))
+        all.get(..(counts.replicates(case) as usize).min(all.len())).filter(|some| !some.is_empty())
     }
 
     /// Notes how long it took.

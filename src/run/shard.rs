@@ -119,6 +119,9 @@ pub struct ShardRecord {
     pub platform: Platform,
     /// What the names of cases had to contain.
     pub filter: Option<String>,
+    /// The most replicates of a run that goes on until it is sure.
+    #[serde(default)]
+    pub until_sure: Option<u32>,
     /// Where it ran.
     pub machine: Machine,
     /// When it began, UTC.
@@ -183,7 +186,11 @@ impl Prepared<'_> {
         for set in &self.sets {
             let studio = Studio { set, means, journal, progress: &progress };
             let mut rendered = Rendered::default();
-            studio.render(&mine(set, Some(shard)), self.plan.suite.file.replicates.get(), &mut rendered)?;
+            let own = mine(set, Some(shard));
+            match self.plan.until_sure {
+                Some(_) if !own.is_empty() => drop(studio.scene(&mut rendered)?),
+                _ => studio.render(&own, self.plan.suite.file.replicates.get(), &mut rendered)?,
+            }
             let failed = rendered.done.iter().any(|d| d.error.is_some());
             units.extend(rendered.done);
             if failed && means.fail_fast {
@@ -201,6 +208,7 @@ impl Prepared<'_> {
             seed: self.plan.seed,
             platform: self.plan.platform,
             filter: self.plan.filter.clone(),
+            until_sure: self.plan.until_sure,
             machine: means.machine.clone(),
             began: timing.began,
             seconds: start.elapsed().as_secs_f64(),

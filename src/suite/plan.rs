@@ -52,6 +52,9 @@ pub struct Plan<'a> {
     /// What the names of cases had to contain, where only some were asked for. The
     /// cases that those are compared with are in the plan, too.
     pub filter: Option<String>,
+    /// The most replicates of a case, where they are added until its verdicts are
+    /// decided; None where each case has the suite's.
+    pub until_sure: Option<u32>,
     /// The record that gates `against = "base"` are held against; None leaves them idle.
     pub base: Option<Record>,
 }
@@ -89,7 +92,15 @@ impl<'a> Plan<'a> {
                 }
             }
         }
-        Plan { suite, cases, seed: seed.unwrap_or(suite.file.seed), platform, filter: None, base: None }
+        Plan {
+            suite,
+            cases,
+            seed: seed.unwrap_or(suite.file.seed),
+            platform,
+            filter: None,
+            until_sure: None,
+            base: None,
+        }
     }
 
     /// Keeps the cases whose `scene/estimator/renderer/rays` contains a text, and those
