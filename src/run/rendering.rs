@@ -145,6 +145,8 @@ impl Studio<'_> {
                 let guard = shared.lock().unwrap_or_else(PoisonError::into_inner);
                 match unit {
                     Unit::Case(case) => match guard.0.images.get(&case.id()) {
+                        // What was taken from disk may be of a later look.
+                        Some(Ok(images)) if images.replicates.len() >= replicates as usize => continue,
                         Some(Ok(images)) => Some(images.clone()),
                         Some(Err(_)) => continue,
                         None => None,
