@@ -41,7 +41,7 @@ pub const FILE: &str = "record.json";
 pub const SHARD: &str = "shard.json";
 
 /// The folder that a run works in; marks a record that a run has begun to fill.
-const BEGUN: &str = ".aogauge-run";
+pub(crate) const BEGUN: &str = ".aogauge-run";
 
 /// Everything one run found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

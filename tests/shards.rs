@@ -198,6 +198,31 @@ fn an_interrupted_run_leaves_a_record_marked_incomplete_and_can_go_on() {
     same(&out);
 }
 
+/// As a script's background job has it, and `nohup`.
+#[cfg(unix)]
+#[test]
+fn ignored_signals_do_not_keep_a_scheduler_from_ending_a_run() {
+    let dir = WHOLE.dir.path();
+    let out = dir.join("background");
+    let line = format!(
+        "trap '' INT HUP; exec {} run small.toml --renderer cpu --no-cache --out {}",
+        env!("CARGO_BIN_EXE_aogauge"),
+        out.display()
+    );
+    let child = Command::new("sh").args(["-c", &line]).current_dir(dir).stderr(Stdio::piped()).spawn().unwrap();
+    let kill = |signal: &str| Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+    while !out.join(".aogauge-run/units/plane+look.json").exists() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert!(kill("-HUP").success() && kill("-TERM").success());
+    let ended = child.wait_with_output().unwrap();
+    let stderr = String::from_utf8_lossy(&ended.stderr);
+    // A hang-up that was listened to would have made the other signal end it at once.
+    assert!(ended.status.code() == Some(5) && stderr.contains("goes on from here"), "{:?}: {stderr}", ended.status);
+    assert!(run(dir, &out, &[]).status.success());
+    same(&out);
+}
+
 #[test]
 fn one_run_at_a_time_fills_a_folder() {
     let dir = WHOLE.dir.path();
@@ -236,6 +261,11 @@ fn merge(shards: &[PathBuf], out: &str) -> Output {
 fn merged_shards_are_the_whole() {
     let dir = WHOLE.dir.path();
     let mut parts = shards(3, "part", &[]);
+    // Machines may see the same suite under other names of its folder.
+    let path = parts[1].join("shard.json");
+    let text = fs::read_to_string(&path).unwrap();
+    assert!(text.contains("\"suite\": \"small.toml\""));
+    fs::write(&path, text.replace("\"suite\": \"small.toml\"", "\"suite\": \"/data/small.toml\"")).unwrap();
     parts.rotate_left(1);
     let merged = merge(&parts, "merged");
     assert!(merged.status.success(), "{}", String::from_utf8_lossy(&merged.stderr));
@@ -257,6 +287,11 @@ fn merged_shards_are_the_whole() {
     refused(&[&parts[1..], &other[1..2]].concat(), 2, "are not of one run: their seed differs");
     let four = shards(4, "four", &[]);
     refused(&[&parts[..1], &four[..1]].concat(), 2, "number of shards differs");
+
+    let hidden = parts.iter().find(|p| p.join(".aogauge-run/images").exists()).unwrap();
+    fs::rename(hidden.join(".aogauge-run"), dir.join("left-behind")).unwrap();
+    refused(&parts, 2, "the hidden folder .aogauge-run of the shard is not in it");
+    fs::rename(dir.join("left-behind"), hidden.join(".aogauge-run")).unwrap();
 
     let image = walk(&parts[0]);
     let mut bytes = fs::read(&image).unwrap();
@@ -287,8 +322,11 @@ fn the_environment_names_the_shard() {
         let out = dir.join("environment");
         let _ = fs::remove_dir_all(&out);
         let mut command = command(dir, &out, &["--shard", "auto", "--dry-run"]);
-        for name in ["AOGAUGE_SHARD", "CI_NODE_INDEX", "CI_NODE_TOTAL", "SLURM_ARRAY_TASK_ID", "JOB_COMPLETION_INDEX"] {
-            command.env_remove(name);
+        for (name, _) in std::env::vars() {
+            if ["AOGAUGE_SHARD", "CI_NODE_", "SLURM_", "JOB_COMPLETION", "MATRIX_"].iter().any(|p| name.starts_with(p))
+            {
+                command.env_remove(name);
+            }
         }
         let ended = command.envs(variables.iter().copied()).output().unwrap();
         (ended.status.code().unwrap(), String::from_utf8(ended.stderr).unwrap())
@@ -302,6 +340,12 @@ fn the_environment_names_the_shard() {
         ),
         (vec![("JOB_COMPLETION_INDEX", "1"), ("JOB_COMPLETIONS", "5")], "shard 2/5, by Kubernetes"),
         (vec![("MATRIX_INDEX", "1"), ("MATRIX_TOTAL", "5")], "shard 2/5, by GitHub Actions"),
+        // A job of GitLab that is not parallel starts a Slurm array.
+        (
+            vec![("CI_NODE_TOTAL", "1"), ("SLURM_ARRAY_TASK_ID", "4"), ("SLURM_ARRAY_TASK_COUNT", "5")],
+            "shard 5/5, by Slurm",
+        ),
+        (vec![("AOGAUGE_SHARD", ""), ("MATRIX_INDEX", "1"), ("MATRIX_TOTAL", "5")], "shard 2/5, by GitHub Actions"),
     ] {
         let (code, stderr) = part(&variables);
         assert!(code == 0 && stderr.contains(says), "{stderr}");
@@ -311,6 +355,10 @@ fn the_environment_names_the_shard() {
         (vec![("CI_NODE_INDEX", "2")], "CI_NODE_TOTAL is not"),
         (vec![("AOGAUGE_SHARD", "6/5")], "'6/5' is no shard"),
         (vec![("JOB_COMPLETION_INDEX", "5"), ("JOB_COMPLETIONS", "5")], "the index must go from 0"),
+        (
+            vec![("CI_NODE_INDEX", "2"), ("CI_NODE_TOTAL", "5"), ("MATRIX_INDEX", "2"), ("MATRIX_TOTAL", "5")],
+            "GitLab says shard 2/5, GitHub Actions says 3/5",
+        ),
         (vec![("JOB_COMPLETION_INDEX", "x"), ("JOB_COMPLETIONS", "5")], "not a number"),
     ] {
         let (code, stderr) = part(&variables);

@@ -1,6 +1,7 @@
 //! `aogauge run`
 
 mod dry_run;
+mod interrupt;
 
 use super::{Exit, Failure, Format, json, on_gpu::OnGpu, print, tell};
 use crate::{
@@ -196,7 +197,7 @@ fn prepare(
     let folder = folder(args, &prepared, shard, &machine)?;
     let cache = if args.no_cache { None } else { JudgeCache::of_user() };
     let stop = Stop::default();
-    on_interrupt(&stop);
+    interrupt::listen(&stop);
     let means = Means {
         gpu: gpu.as_ref().map(|g| g as &(dyn Renderer + Sync)),
         cache: cache.as_ref(),
@@ -233,22 +234,6 @@ fn folder(
         tell("aogauge: going on where an unfinished run of the same plan ended (--fresh begins anew)");
     }
     Ok(folder)
-}
-
-/// The first Ctrl-C, or the signal that a scheduler ends a job with, ends the run after
-/// the image it is at; the second ends it at once. What is done is kept either way.
-fn on_interrupt(stop: &Stop) {
-    let stop = stop.clone();
-    let handler = move || {
-        if stop.is_asked() {
-            std::process::exit(Exit::Incomplete as i32);
-        }
-        stop.ask();
-        tell("aogauge: ending after this image; press Ctrl-C again to end at once");
-    };
-    // In one process only the first run can listen; without it Ctrl-C kills, and what is
-    // done is kept on disk anyway.
-    let _ = ctrlc::try_set_handler(handler);
 }
 
 /// Writes the report, and says how it went.

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     disk::DiskError,
-    record::{Machine, Record, RecordFolder, SHARD},
+    record::{BEGUN, Machine, Record, RecordFolder, SHARD},
     render::{Geometry, Loaded, RenderError, Renderer},
 };
 use std::{
@@ -57,7 +57,7 @@ impl Shards {
                 ("version of aogauge", shard.tool != one.tool),
                 ("number of shards", shard.shard.of != one.shard.of),
                 ("seed", shard.seed != one.seed),
-                ("suite", shard.suite != one.suite),
+                ("suite", shard.suite != one.suite && shard.identity != one.identity),
                 ("filter", shard.filter != one.filter),
                 ("way to go on until sure", shard.until_sure != one.until_sure),
                 ("platform", shard.platform != one.platform),
@@ -179,6 +179,13 @@ fn copy(from: &Path, to: &Path, file: &Path, hash: &str) -> Result<(), DiskError
     let (source, target) = (from.join(file), to.join(file));
     let parent = target.parent().unwrap_or(to);
     fs::create_dir_all(parent).map_err(DiskError::io(parent, "create the folder"))?;
+    if !source.exists() && file.starts_with(BEGUN) && !from.join(BEGUN).exists() {
+        let why = format!(
+            "the hidden folder {BEGUN} of the shard is not in it: copy or upload it too (for \
+             actions/upload-artifact: include-hidden-files)"
+        );
+        return Err(DiskError::content(from, why));
+    }
     if journal::sha256(&source)? != *hash {
         return Err(DiskError::content(
             &source,

@@ -51,6 +51,15 @@ impl fmt::Display for Shard {
     }
 }
 
+/// What names a shard in its environment: the name of a system, the variables of index
+/// and count, and the first index, or the variable that holds it.
+const SYSTEMS: [[&str; 4]; 4] = [
+    ["GitLab", "CI_NODE_INDEX", "CI_NODE_TOTAL", "1"],
+    ["Slurm", "SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_COUNT", "SLURM_ARRAY_TASK_MIN"],
+    ["Kubernetes", "JOB_COMPLETION_INDEX", "JOB_COMPLETIONS", "0"],
+    ["GitHub Actions", "MATRIX_INDEX", "MATRIX_TOTAL", "0"],
+];
+
 impl Shard {
     /// K and N as the environment of what runs the shards has them, with its name:
     /// `AOGAUGE_SHARD=K/N`; GitLab's `parallel` (`CI_NODE_INDEX` from 1, `CI_NODE_TOTAL`); Slurm
@@ -58,44 +67,52 @@ impl Shard {
     /// Jobs of Kubernetes (`JOB_COMPLETION_INDEX` from 0, and `JOB_COMPLETIONS`, which the Job must
     /// set itself). GitHub's matrices set no variable of their own: the workflow hands
     /// over `strategy.job-index` (from 0) and `strategy.job-total` as `MATRIX_INDEX` and `MATRIX_TOTAL`.
+    /// An empty variable counts as none. `AOGAUGE_SHARD` goes before all others.
     ///
     /// # Errors
-    /// One sentence, where no such variables are set, only one of a pair is, or they are
-    /// no shard.
+    /// One sentence, where no such variables are set, only one of a pair is, they are no
+    /// shard, or two systems name different ones, as a Slurm array that was submitted by a parallel
+    /// job of GitLab has it.
     pub fn of_environment(get: &dyn Fn(&str) -> Option<String>) -> Result<(Shard, &'static str), String> {
+        let get = |name: &str| get(name).filter(|value| !value.trim().is_empty());
         if let Some(text) = get("AOGAUGE_SHARD") {
-            return Ok((text.parse().map_err(|e| format!("AOGAUGE_SHARD: {e}"))?, "AOGAUGE_SHARD"));
+            return Ok((text.trim().parse().map_err(|e| format!("AOGAUGE_SHARD: {e}"))?, "AOGAUGE_SHARD"));
         }
-        let pairs = [
-            ("GitLab", "CI_NODE_INDEX", "CI_NODE_TOTAL", "1"),
-            ("Slurm", "SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_COUNT", "SLURM_ARRAY_TASK_MIN"),
-            ("Kubernetes", "JOB_COMPLETION_INDEX", "JOB_COMPLETIONS", "0"),
-            ("GitHub Actions", "MATRIX_INDEX", "MATRIX_TOTAL", "0"),
-        ];
-        for (name, index, of, first) in pairs {
-            let (k, n) = match (get(index), get(of)) {
-                (None, None) => continue,
-                (Some(k), Some(n)) => (k, n),
-                (k, _) => {
-                    let [set, missing] = if k.is_some() { [index, of] } else { [of, index] };
-                    return Err(format!("{set} is set, but {missing} is not: {name} needs both to name a shard"));
-                }
-            };
-            let first = if first.len() == 1 { Some(first.to_owned()) } else { get(first) };
-            let number = |name: &str, text: &str| {
-                text.trim().parse::<u32>().map_err(|_| format!("{name} is '{text}', not a number of 0 or more"))
-            };
-            let first = first.map_or(Ok(0), |f| number("SLURM_ARRAY_TASK_MIN", &f))?;
-            let (k, n) = (number(index, &k)?, number(of, &n)?);
-            let at = k.checked_sub(first).map(|k| k + 1).filter(|k| *k <= n && n <= MOST);
-            let at = at.ok_or_else(|| {
-                format!(
-                    "{index} is {k} and {of} is {n}: the index must go from {first} in steps of 1, one for each shard"
-                )
-            })?;
-            return Ok((Shard { index: at, of: n }, name));
+        let (mut found, mut half) = (Vec::new(), None);
+        for [name, index, of, first] in SYSTEMS {
+            let [k, n] = [get(index), get(of)];
+            if let (Some(k), Some(n)) = (&k, &n) {
+                let first = if first.parse::<u32>().is_ok() { Some(first.to_owned()) } else { get(first) };
+                let first = first.unwrap_or_else(|| "0".to_owned());
+                found.push((Shard::counted([index, k], [of, n], &first)?, name));
+            } else if k.is_some() || n.is_some() {
+                // GitLab sets the count in every job, so that alone it says nothing.
+                let [set, missing] = if k.is_some() { [index, of] } else { [of, index] };
+                half = half.or(Some(format!("{set} is set, but {missing} is not: {name} needs both to name a shard")));
+            }
         }
-        Err("no shard is named by the environment: give --shard K/N, or set AOGAUGE_SHARD".to_owned())
+        let none = || "no shard is named by the environment: give --shard K/N, or set AOGAUGE_SHARD".to_owned();
+        let Some(&one) = found.first() else { return Err(half.unwrap_or_else(none)) };
+        match found.iter().find(|other| other.0 != one.0) {
+            Some((shard, name)) => Err(format!(
+                "{} says shard {}, {name} says {shard}: give --shard K/N, or set AOGAUGE_SHARD",
+                one.1, one.0
+            )),
+            None => Ok(one),
+        }
+    }
+
+    /// The shard of an index that is counted from `first` on.
+    fn counted([index, k]: [&str; 2], [of, n]: [&str; 2], first: &str) -> Result<Shard, String> {
+        let number = |name: &str, text: &str| {
+            text.trim().parse::<u32>().map_err(|_| format!("{name} is '{text}', not a number of 0 or more"))
+        };
+        let (k, n, first) = (number(index, k)?, number(of, n)?, number("the first index", first)?);
+        let at = k.checked_sub(first).filter(|k| *k < n && n <= MOST);
+        let at = at.ok_or_else(|| {
+            format!("{index} is {k} and {of} is {n}: the index must go from {first} in steps of 1, one for each shard")
+        })?;
+        Ok(Shard { index: at + 1, of: n })
     }
 }
 
