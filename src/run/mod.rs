@@ -1,6 +1,6 @@
 //! A plan becomes a record: render, measure, judge, write.
 //!
-//! A scene is rendered in [units](unit), none of which needs another's images: the
+//! A scene is rendered in units, none of which needs another's images: the
 //! judge, a converged image a method, pictures, and the replicates of each case. Every
 //! finished unit is kept on disk with its hash. All that is measured is measured from
 //! these images afterwards, so a run that goes on where a killed one ended, or that is
