@@ -16,6 +16,7 @@ pub(super) fn place(metric: &Metric, scene: &SceneRecord, case: Option<&CaseReco
     let mut text = match (metric.name, metric.region) {
         (_, Some(region)) => counted(region),
         (MetricName::OverDarkening | MetricName::RendererDifference, None) => counted(Region::All),
+        (MetricName::DistinctReplicates, None) => "all pixels of each replicate".to_owned(),
         (_, None) => {
             let method = case.map_or("Q", |c| c.case.estimator.as_str());
             let flank = match scene.brighter.get(method) {
@@ -44,7 +45,7 @@ pub(super) fn picture(metric: &Metric, scene: &SceneRecord, case: Option<&CaseRe
         MetricName::ContrastError | MetricName::Removed if judged => of(pictures::MINUS_Q),
         MetricName::Bias | MetricName::Mae | MetricName::Rmse if judged => of(pictures::MINUS_CONVERGED),
         // No picture of a report shows what is below one grey level.
-        MetricName::RendererDifference => image.clone(),
+        MetricName::RendererDifference | MetricName::DistinctReplicates => image.clone(),
         _ => of(pictures::MEASURE),
     }
 }

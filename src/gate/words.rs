@@ -98,6 +98,7 @@ fn meaning(name: MetricName) -> &'static str {
         MetricName::JudgeBias | MetricName::JudgeMae | MetricName::JudgeRmse => "the difference of openness from Q",
         MetricName::OverDarkening => "the mean of classic AO's openness less this one's",
         MetricName::RendererDifference => "the mean of openness less that on the CPU with the same seeds",
+        MetricName::DistinctReplicates => "the share of replicates that are unlike all earlier ones",
     }
 }
 

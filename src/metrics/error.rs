@@ -8,6 +8,7 @@ use super::{
     regions::{MIN_PIXELS, Region, Regions},
 };
 use crate::stats::Estimate;
+use std::collections::HashSet;
 
 /// One value a replicate.
 fn over_replicates(
@@ -96,6 +97,16 @@ pub fn over_darkening(method: &Method<'_>, classic: &Method<'_>) -> Metric {
 /// Mean of O less the CPU's O over the whole image, replicates paired by seed.
 pub fn renderer_difference(own: &[Vec<f32>], cpu: &[Vec<f32>], regions: &Regions) -> Metric {
     Metric::new(MetricName::RendererDifference, None, difference(own, cpu, regions))
+}
+
+/// Replicates that are unlike all earlier ones, over all: a number without an error. All
+/// statistics rest on it, and none shows it: with one seed for all they find no
+/// variance, and are sure of whatever they see.
+pub fn distinct_replicates(replicates: &[Vec<f32>]) -> Metric {
+    let bits = |image: &[f32]| image.iter().map(|v| v.to_bits()).collect::<Vec<u32>>();
+    let distinct: HashSet<Vec<u32>> = replicates.iter().map(|r| bits(r)).collect();
+    let (n, value) = (replicates.len() as f64, distinct.len() as f64 / replicates.len() as f64);
+    Metric::new(MetricName::DistinctReplicates, None, Ok(Estimate { value, se: 0.0, df: n - 1.0 }))
 }
 
 /// Pixels that may hold a number in one image only before a difference means

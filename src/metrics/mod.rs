@@ -51,6 +51,9 @@ pub enum MetricName {
     OverDarkening,
     /// Mean of O on this renderer less O on the CPU, same seeds.
     RendererDifference,
+    /// Replicates that are unlike all earlier ones, over all replicates. Below 1 where
+    /// nothing is random in the image, or one seed served twice.
+    DistinctReplicates,
 }
 
 impl MetricName {
@@ -71,6 +74,7 @@ impl MetricName {
             MetricName::JudgeRmse => "judge-rmse",
             MetricName::OverDarkening => "over-darkening",
             MetricName::RendererDifference => "renderer-difference",
+            MetricName::DistinctReplicates => "distinct-replicates",
         }
     }
 }

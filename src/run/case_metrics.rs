@@ -37,6 +37,7 @@ pub(super) fn metrics(method: &Method<'_>, others: &Others<'_>) -> Vec<Metric> {
     if let Some(cpu) = others.cpu {
         metrics.push(error::renderer_difference(method.replicates, cpu, method.regions));
     }
+    metrics.push(error::distinct_replicates(method.replicates));
     metrics
 }
 

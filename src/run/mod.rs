@@ -30,6 +30,9 @@ pub use progress::Observer;
 pub use shard::{Shard, ShardRecord};
 pub use stop::Stop;
 
+#[cfg(test)]
+mod mutations;
+
 use crate::{
     gate::{Evidence, judge},
     judge_cache::JudgeCache,

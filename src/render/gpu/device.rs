@@ -27,6 +27,9 @@ pub(super) struct Setup {
     pub patience: Duration,
     #[cfg(test)]
     pub fuse: Option<Arc<super::tests::Fuse>>,
+    /// Some text of the shaders and what stands in its place: a mistake made on purpose.
+    #[cfg(test)]
+    pub mistake: Option<[&'static str; 2]>,
 }
 
 impl Default for Setup {
@@ -38,6 +41,8 @@ impl Default for Setup {
             patience: Duration::from_secs(120),
             #[cfg(test)]
             fuse: None,
+            #[cfg(test)]
+            mistake: None,
         }
     }
 }
@@ -156,6 +161,10 @@ impl Device {
 
     /// Some WGSL, for pipelines.
     pub fn module(&self, label: &str, source: &str) -> wgpu::ShaderModule {
+        #[cfg(test)]
+        let mistaken = self.setup.mistake.map_or_else(|| source.to_owned(), |[from, to]| source.replace(from, to));
+        #[cfg(test)]
+        let source = mistaken.as_str();
         let descriptor =
             wgpu::ShaderModuleDescriptor { label: Some(label), source: wgpu::ShaderSource::Wgsl(source.into()) };
         match self.setup.options.checks {

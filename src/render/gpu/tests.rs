@@ -41,6 +41,12 @@ pub(crate) fn losing(at: impl IntoIterator<Item = u32>) -> Gpu {
     Gpu::set_up(Setup { fuse: Some(Arc::new(fuse)), ..Setup::default() }).unwrap()
 }
 
+/// A GPU whose shaders hold a mistake: some text replaced, which must be there.
+pub(crate) fn mistaken(from: &'static str, to: &'static str) -> Gpu {
+    assert!(super::SHADER.contains(from), "{from}");
+    Gpu::set_up(Setup { mistake: Some([from, to]), ..Setup::default() }).unwrap()
+}
+
 fn job<'a>(scene: &Scene, view: &'a View, estimator: Estimator) -> Job<'a> {
     Job { view, camera: None, estimator, ao: scene.ao, rays: 4, seed: 1, replicate: 0 }
 }
