@@ -31,6 +31,15 @@ fn verify(out: &Path) -> String {
 }
 
 #[test]
+fn smoke_is_green() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = aogauge(&["run", "smoke", "--no-cache", "--out", folder.path().join("out").to_str().unwrap()]);
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{stderr}");
+    assert!(stderr.contains("0 failed, 0 inconclusive\n"), "no known failures either: {stderr}");
+}
+
+#[test]
 fn the_built_in_suite_keeps_its_promises() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("seed-1");

@@ -18,8 +18,12 @@ use crate::{
 use std::path::Path;
 
 /// The built-in suites, by name.
-pub const BUILT_IN: [(&str, &str); 2] =
-    [("thin-occluders", include_str!("thin-occluders.toml")), ("library", include_str!("library.toml"))];
+pub const BUILT_IN: [(&str, &str); 4] = [
+    ("smoke", include_str!("smoke.toml")),
+    ("thin-occluders", include_str!("thin-occluders.toml")),
+    ("library", include_str!("library.toml")),
+    ("full", include_str!("full.toml")),
+];
 
 /// A method under a name.
 #[derive(Clone, Debug, PartialEq)]
@@ -237,17 +241,20 @@ mod tests {
 
     #[test]
     fn the_built_in_suites_load() {
-        let mut scenes = Vec::new();
-        for (name, _) in BUILT_IN {
+        let scenes = |name: &str| -> Vec<String> {
             let suite = Suite::load(name).unwrap_or_else(|e| panic!("{e}"));
             assert!(!suite.gates.is_empty());
-            scenes.extend(suite.scenes.into_iter().map(|s| s.name));
-        }
-        // Between them every scene of the library, once.
-        scenes.sort();
+            suite.scenes.into_iter().map(|s| s.name).collect()
+        };
+        assert_eq!(scenes("smoke").len(), 3);
+        // Between them every scene of the library, once; and in all.
+        let mut parts = [scenes("thin-occluders"), scenes("library")].concat();
+        let mut full = scenes("full");
         let mut all: Vec<&str> = aogauge_scenes::library::SCENES.iter().map(|(name, _)| *name).collect();
+        parts.sort();
+        full.sort();
         all.sort_unstable();
-        assert_eq!(scenes, all);
+        assert_eq!((&parts[..], &full[..]), (&all.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>()[..], &parts[..]));
     }
 
     fn with(extra: &str) -> Result<Suite, SuiteError> {
