@@ -54,14 +54,14 @@ impl Observer for Silent {
 }
 
 /// The record of some cases of the built-in suite.
-fn run(filter: &str, cpu: Mistake, gpu: Option<Gpu>) -> Record {
+fn run(filter: &str, cpu: Mistake, gpu: Option<&Gpu>) -> Record {
     let suite = Suite::load("thin-occluders").unwrap();
     let platform = if gpu.is_some() { Platform::Gpu } else { Platform::Cpu };
     let plan = Plan::new(&suite, platform, None).only(filter);
     let dir = tempfile::tempdir().unwrap();
     let folder = RecordFolder::create(&dir.path().join("out")).unwrap();
     let mut means = Means::new(&cpu, Machine::here("a test".into(), Some(true)));
-    means.gpu = gpu.as_ref().map(|g| g as &(dyn Renderer + Sync));
+    means.gpu = gpu.map(|g| g as &(dyn Renderer + Sync));
     Prepared::new(&plan).unwrap().run(&means, &folder, &Silent).unwrap()
 }
 
@@ -74,7 +74,7 @@ fn red(record: &Record) -> BTreeSet<&str> {
 #[test]
 fn without_a_mistake_nothing_is_red() {
     for filter in ["plane/", "corner/classic"] {
-        assert_eq!(red(&run(filter, Mistake::None, Some(Gpu::open().unwrap()))), BTreeSet::new());
+        assert_eq!(red(&run(filter, Mistake::None, Some(&Gpu::open().unwrap()))), BTreeSet::new());
     }
 }
 
@@ -105,7 +105,7 @@ fn a_missing_cosine() {
         "let sin_theta = sqrt(place.x);\n    let cos_theta = sqrt(1.0 - place.x);",
         "let cos_theta = 1.0 - place.x;\n    let sin_theta = sqrt(1.0 - cos_theta * cos_theta);",
     );
-    let record = run("corner/classic/gpu", Mistake::None, Some(gpu));
+    let record = run("corner/classic/gpu", Mistake::None, Some(&gpu));
     let red = red(&record);
     assert!(red.contains("A corner reads what the formula says"), "{red:?}");
     assert!(red.contains("GPU and CPU means are equivalent"), "{red:?}");
@@ -114,6 +114,6 @@ fn a_missing_cosine() {
 #[test]
 fn a_flipped_normal_on_the_gpu() {
     let gpu = mistaken("dot(normal, direction) > 0.0), 0u)", "dot(normal, direction) < 0.0), 0u)");
-    let record = run("corner/classic/gpu", Mistake::None, Some(gpu));
+    let record = run("corner/classic/gpu", Mistake::None, Some(&gpu));
     assert!(red(&record).contains("GPU and CPU means are equivalent"), "{:?}", red(&record));
 }
