@@ -18,6 +18,7 @@ pub struct Args {
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
     let out = args.out.as_ref().unwrap_or(&args.record);
     let record = report::write(&args.record, out)?;
+    report::html::write(&args.record, out)?;
     tell(&format!("{}: {}", out.join(report::FILE).display(), record.summary_line()));
     Ok(Exit::Pass)
 }

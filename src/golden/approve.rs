@@ -12,13 +12,32 @@ use std::{
     path::{Path, PathBuf},
 };
 
+/// Which cases of a record, by their `scene/estimator/renderer/rays`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Selection<'a> {
+    /// Those that contain this.
+    Containing(&'a str),
+    /// The one that is this.
+    Case(&'a str),
+}
+
+impl Selection<'_> {
+    /// Whether a case is one of them.
+    pub fn selects(&self, id: &str) -> bool {
+        match self {
+            Selection::Containing(part) => id.contains(part),
+            Selection::Case(case) => id == *case,
+        }
+    }
+}
+
 /// What is accepted, and why.
 #[derive(Clone, Debug)]
 pub struct Approval<'a> {
     /// Why these images are right.
     pub reason: &'a str,
-    /// Only cases whose `scene/estimator/renderer/rays` contains this.
-    pub only: &'a str,
+    /// Which cases.
+    pub only: Selection<'a>,
     /// `cpu` or `gpu`.
     pub renderer: &'a str,
     /// The name of another golden beside the first, legal by
@@ -91,7 +110,7 @@ impl Store {
         approval: &Approval<'_>,
         waiting: &dyn Fn(),
     ) -> Result<Approved, ApproveError> {
-        let selected = |c: &&CaseRecord| c.case.renderer == approval.renderer && c.case.id().contains(approval.only);
+        let selected = |c: &&CaseRecord| c.case.renderer == approval.renderer && approval.only.selects(&c.case.id());
         let cases: Vec<&CaseRecord> = golden_cases(record).filter(selected).collect();
         let told = |c: &&CaseRecord| Some(format!("{} ({})", c.case.id(), c.error.as_deref()?));
         let lost: Vec<String> = cases.iter().filter_map(told).collect();
@@ -117,6 +136,8 @@ impl Store {
             after = (after + change.put(&slot.path(), layers)?).saturating_sub(size(&self.path(slot)));
         }
         change.commit()?;
+        let approved: Vec<String> = cases.iter().map(|c| c.case.id()).collect();
+        self.forget_rejections(&approved, waiting)?;
         Ok(Approved { files: ready.iter().map(|(slot, _)| self.path(slot)).collect(), before, after })
     }
 }

@@ -1,7 +1,7 @@
 //! Holding a record against its goldens.
 
 use super::{
-    Comparison, Golden, Slot, Store, Terms,
+    Comparison, Golden, Rejected, Slot, Store, Terms,
     approve::{definition, sampled},
     compare,
     stale::{Stale, stale},
@@ -57,6 +57,8 @@ pub struct Checked {
     pub verdict: Verdict,
     /// Other goldens of the case. Those after one that holds were not looked at.
     pub others: Vec<Against>,
+    /// Why a reviewer refused this very image; null where none did.
+    pub rejected: Option<String>,
 }
 
 /// What kind of end a verification comes to.
@@ -120,6 +122,11 @@ impl Checked {
 
     /// One line for people.
     pub fn line(&self) -> String {
+        format!("{:<44} {}", self.case, self.text())
+    }
+
+    /// The same without the case.
+    pub fn text(&self) -> String {
         let text = match &self.verdict {
             Verdict::Missing => format!("MISSING    there is no {}", self.golden.display()),
             Verdict::Unusable(why) => format!("UNUSABLE   {why}"),
@@ -132,7 +139,8 @@ impl Checked {
             (n, Outcome::Pass) => format!("; {} holds, {n} before it did not", name(&self.golden)),
             (n, _) => format!("; nearest of {}: {}", n + 1, name(&self.golden)),
         };
-        format!("{:<44} {text}{others}", self.case)
+        let rejected = self.rejected.as_ref().map_or_else(String::new, |why| format!("; rejected before: {why}"));
+        format!("{text}{others}{rejected}")
     }
 }
 
@@ -153,8 +161,14 @@ impl Store {
     /// is a [`Verdict`].
     pub fn verify(&self, folder: &Path, record: &Record, only: &str) -> Result<Verification, DiskError> {
         let cases: Vec<&CaseRecord> = golden_cases(record).filter(|c| c.case.id().contains(only)).collect();
+        let rejections = self.rejections()?;
         self.reading(|snapshot| {
-            let check = |case: &&CaseRecord| self.check(snapshot, folder, record, case, cases.len());
+            let check = |case: &&CaseRecord| {
+                let mut checked = self.check(snapshot, folder, record, case, cases.len());
+                let alike = |r: &&Rejected| r.case == checked.case && Some(&r.pixel_hash) == case.hash.as_ref();
+                checked.rejected = rejections.iter().find(alike).map(|r| r.reason.clone());
+                checked
+            };
             let checked: Vec<Checked> = cases.par_iter().map(check).collect();
             let (version, stale, interrupted) = (VERSION, stale(&checked), snapshot.interrupted);
             Verification { version, alpha: ALPHA, cases: checked, stale, interrupted }
@@ -166,7 +180,7 @@ impl Store {
         let name = case.case.id();
         let lost = |why: String| {
             let golden = self.path(&slot);
-            Checked { case: name.clone(), golden, verdict: Verdict::Lost(why), others: Vec::new() }
+            Checked { case: name.clone(), golden, verdict: Verdict::Lost(why), others: Vec::new(), rejected: None }
         };
         if let Some(error) = &case.error {
             return lost(error.clone());
@@ -196,10 +210,10 @@ impl Store {
             x.cmp(&y).then(dx.total_cmp(&dy))
         });
         match nearest {
-            None => Checked { case: name, golden: self.path(&slot), verdict: Verdict::Missing, others: all },
+            None => Checked { case: name, golden: self.path(&slot), verdict: Verdict::Missing, others: all, rejected: None },
             Some(i) => {
                 let Against { golden, verdict } = all.remove(i);
-                Checked { case: name, golden, verdict, others: all }
+                Checked { case: name, golden, verdict, others: all, rejected: None }
             }
         }
     }

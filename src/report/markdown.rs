@@ -164,7 +164,7 @@ fn case_row(record: &Record, case: &CaseRecord, has_judge: bool) -> CaseRow {
     }
 }
 
-fn judge_text(scene: &SceneRecord) -> Option<String> {
+pub(super) fn judge_text(scene: &SceneRecord) -> Option<String> {
     let judge = scene.judge.as_ref()?;
     let Some(contrast) = judge.contrast.estimate() else {
         let why = judge.contrast.note.as_deref().unwrap_or("K(Q) is not known");

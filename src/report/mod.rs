@@ -3,8 +3,10 @@
 
 pub mod bench;
 mod convergence;
+mod definitions;
 mod error_maps;
 pub mod flatland;
+pub mod html;
 mod markdown;
 mod occluders;
 pub(crate) mod picture;
@@ -37,6 +39,16 @@ pub enum ReportError {
         image: String,
         /// The layer.
         layer: String,
+    },
+    /// An image has another size than its scene.
+    #[error("{image}: this image has {} x {} pixels, the scene's measure view {} x {}", found[0], found[1], wanted[0], wanted[1])]
+    Size {
+        /// The image.
+        image: String,
+        /// Its pixels across and down.
+        found: [u32; 2],
+        /// Those of the measure view.
+        wanted: [u32; 2],
     },
     /// Two images of the record do not fit each other.
     #[error("{image}: no error map can be drawn: {source}")]

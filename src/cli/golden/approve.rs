@@ -2,7 +2,7 @@
 
 use super::{Exit, Failure, LARGE, bytes, nothing, print, tell, waiting, warn_if_large};
 use crate::{
-    golden::{Approval, ApproveError, Candidates, Limits, Store, check_golden_name},
+    golden::{Approval, ApproveError, Candidates, Limits, Selection, Store, check_golden_name},
     record::Record,
 };
 use clap::ValueEnum;
@@ -60,7 +60,7 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     let store = Store::new(&args.goldens);
     let approval = Approval {
         reason: &args.reason,
-        only: &args.only,
+        only: Selection::Containing(&args.only),
         renderer: match args.renderer {
             Renderer::Cpu => "cpu",
             Renderer::Gpu => "gpu",

@@ -4,11 +4,15 @@ mod approve;
 mod list;
 mod prune;
 mod remove;
+mod review;
 mod size;
 mod verify;
 
 use super::{Exit, Failure, Format, json, print, tell};
-use crate::record::Record;
+use crate::{
+    golden::{Outcome, Verification},
+    record::Record,
+};
 use clap::Subcommand;
 
 pub(super) use list::Listing;
@@ -25,6 +29,7 @@ pub enum Verb {
     List(list::Args),
     Prune(prune::Args),
     Remove(remove::Args),
+    Review(review::Args),
     Size(size::Args),
 }
 
@@ -35,6 +40,7 @@ pub fn execute(verb: &Verb) -> Result<Exit, Failure> {
         Verb::List(args) => list::execute(args),
         Verb::Prune(args) => prune::execute(args),
         Verb::Remove(args) => remove::execute(args),
+        Verb::Review(args) => review::execute(args),
         Verb::Size(args) => size::execute(args),
     }
 }
@@ -72,4 +78,15 @@ fn bytes(n: u64) -> String {
         _ => (n as f64 / 1e9, "GB"),
     };
     format!("{value:.1} {unit}")
+}
+
+/// The exit code of a verification.
+fn exit(found: &Verification) -> Exit {
+    let ends = [
+        (Outcome::Lost, Exit::Incomplete),
+        (Outcome::Missing, Exit::Golden),
+        (Outcome::Fail, Exit::Failed),
+        (Outcome::Blind, Exit::Inconclusive),
+    ];
+    ends.into_iter().find(|(outcome, _)| found.count(*outcome) > 0).map_or(Exit::Pass, |(_, exit)| exit)
 }

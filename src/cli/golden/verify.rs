@@ -1,8 +1,8 @@
 //! `aogauge golden verify`
 
-use super::{Exit, Failure, Format, json, nothing, print, tell};
+use super::{Exit, Failure, Format, exit, json, nothing, print, tell};
 use crate::{
-    golden::{ALPHA, Candidates, Outcome, Store, Verification},
+    golden::{ALPHA, Candidates, Outcome, Store},
     record::Record,
 };
 use std::path::PathBuf;
@@ -52,14 +52,4 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
         tell("an approval was cut short after it was decided and counts as made; the next approval finishes it");
     }
     Ok(exit(&found))
-}
-
-fn exit(found: &Verification) -> Exit {
-    let ends = [
-        (Outcome::Lost, Exit::Incomplete),
-        (Outcome::Missing, Exit::Golden),
-        (Outcome::Fail, Exit::Failed),
-        (Outcome::Blind, Exit::Inconclusive),
-    ];
-    ends.into_iter().find(|(outcome, _)| found.count(*outcome) > 0).map_or(Exit::Pass, |(_, exit)| exit)
 }

@@ -1,0 +1,63 @@
+//! The report as one HTML page that can be looked around in: what is on it, of a
+//! record. How it looks is [`viewer`](crate::viewer)'s.
+
+mod pairs;
+mod rows;
+
+use super::{ReportError, definitions};
+use crate::{
+    disk::write_whole,
+    record::Record,
+    viewer::{Page, Planes},
+};
+pub(crate) use pairs::SceneImages;
+use std::{collections::BTreeMap, io::Write, path::Path};
+
+/// The name of the page in its folder.
+pub const FILE: &str = "report.html";
+
+/// Makes `report.html` from the record in `record_folder`, into `out`. Returns the
+/// record.
+///
+/// # Errors
+/// Where the record or an image cannot be read, or the page not written.
+pub fn write(record_folder: &Path, out: &Path) -> Result<Record, ReportError> {
+    let record = Record::read(record_folder)?;
+    let html = page(record_folder, &record)?;
+    write_whole(&out.join(FILE), |buffer| buffer.write_all(html.as_bytes()))?;
+    Ok(record)
+}
+
+/// The page of a record.
+fn page(folder: &Path, record: &Record) -> Result<String, ReportError> {
+    let mut planes = Planes::default();
+    let mut items = Vec::new();
+    let mut scenes = Vec::new();
+    // By their places in the record, so that scenes are read one after the other.
+    let mut order = BTreeMap::new();
+    for scene in &record.scenes {
+        let images = SceneImages::read(folder, record, scene)?;
+        for (place, case) in record.cases.iter().enumerate().filter(|(_, c)| c.case.scene == scene.name) {
+            order.insert(place, rows::item(record, case, images.pairs(case, &mut planes)?));
+        }
+        items.extend(rows::judge(record, scene, images.of_judge(&mut planes)));
+        scenes.push(rows::scene(scene)?);
+    }
+    items.extend(order.into_values());
+    items.sort_by_key(|item| rows::rank(item.outcome));
+    let page = Page {
+        title: record.suite.name.clone(),
+        headline: record.suite.description.clone(),
+        outcome: rows::overall(record),
+        summary: format!("{} in {} cases. {}", record.summary_line(), record.summary.cases, record.suite.description),
+        notes: rows::notes(record),
+        gates: rows::gates(record),
+        items,
+        scenes,
+        plots: Vec::new(),
+        words: definitions::of(record),
+        facts: rows::facts(record),
+        review: None,
+    };
+    Ok(page.html(&planes))
+}

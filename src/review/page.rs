@@ -1,0 +1,164 @@
+//! What is on the page of a review.
+
+use super::Review;
+use crate::{
+    golden::{Checked, Golden, Outcome, Sampled, Verdict, sampled},
+    metrics::regions::Region,
+    record::{CaseRecord, Record, SceneRecord},
+    report::{ReportError, html::SceneImages},
+    stats::{ImageSample, IndependentPixels},
+    viewer::{self, Detail, Item, Named, Page, Pair, Planes, flip_map, p_values},
+};
+
+/// How far the scale of differences reaches.
+const LIMIT: f64 = 0.1;
+
+pub(super) fn html(review: &Review, token: &str) -> Result<String, ReportError> {
+    let record = review.record();
+    let mut planes = Planes::default();
+    let mut items = Vec::new();
+    let mut images: Option<(&SceneRecord, SceneImages<'_>)> = None;
+    for (checked, case) in review.shown() {
+        let Some(scene) = record.scenes.iter().find(|s| s.name == case.case.scene) else { continue };
+        // Cases stand scene by scene, so each scene is read once.
+        let of_scene = match images.take() {
+            Some((own, read)) if own.name == scene.name => read,
+            _ => SceneImages::read(&review.folder, record, scene)?,
+        };
+        items.push(item(review, checked, case, &of_scene, &mut planes)?);
+        images = Some((scene, of_scene));
+    }
+    let rank = |outcome| ["error", "fail", "warn", "inconclusive", "pass"].iter().position(|o| *o == outcome);
+    items.sort_by_key(|i| rank(i.outcome));
+    let found = review.verification();
+    let [pass, fail, blind, missing, lost] =
+        [Outcome::Pass, Outcome::Fail, Outcome::Blind, Outcome::Missing, Outcome::Lost].map(|o| found.count(o));
+    let store = review.store.folder().display().to_string();
+    let page = Page {
+        title: format!("Goldens of {}", record.suite.name),
+        headline: String::new(),
+        outcome: match (lost, fail + missing, blind) {
+            (1.., ..) => "error",
+            (_, 1.., _) => "fail",
+            (_, _, 1..) => "inconclusive",
+            _ => "pass",
+        },
+        summary: format!("{pass} hold, {fail} differ, {blind} too noisy to tell, {missing} missing or unusable, {lost} lost"),
+        notes: found.stale.iter().map(crate::golden::Stale::line).collect(),
+        gates: Vec::new(),
+        items,
+        scenes: Vec::new(),
+        plots: Vec::new(),
+        words: Vec::new(),
+        facts: facts(record, &store),
+        review: Some(viewer::Review { token: token.to_owned(), store }),
+    };
+    Ok(page.html(&planes))
+}
+
+fn facts(record: &Record, store: &str) -> Vec<[String; 2]> {
+    vec![
+        ["goldens".to_owned(), store.to_owned()],
+        ["tool".to_owned(), format!("aogauge {}", record.tool)],
+        ["suite".to_owned(), format!("{}, seed {}", record.suite.name, record.seed)],
+        ["machine".to_owned(), format!("{}, {} {}", record.machine.cpu, record.machine.os, record.machine.arch)],
+        ["GPU".to_owned(), record.machine.gpu.clone()],
+    ]
+}
+
+fn item(
+    review: &Review,
+    checked: &Checked,
+    case: &CaseRecord,
+    of_scene: &SceneImages<'_>,
+    planes: &mut Planes,
+) -> Result<Item, ReportError> {
+    let of = &case.case;
+    let golden = Golden::read(&checked.golden).ok();
+    let mut pairs = Vec::new();
+    if let (Some(golden), Verdict::Compared(_)) = (&golden, &checked.verdict) {
+        let image = sampled(&review.folder, review.record(), case)?;
+        pairs.push(pair(golden, &image, planes));
+    }
+    pairs.extend(of_scene.pairs(case, planes)?);
+    let mut facts = Vec::new();
+    if let Some(golden) = &golden {
+        let from = &golden.provenance;
+        facts.extend([
+            ["golden".to_owned(), checked.golden.display().to_string()],
+            ["accepted because".to_owned(), from.reason.clone()],
+            ["accepted from".to_owned(), format!("{}, {}, aogauge {}", from.renderer, from.device, from.tool)],
+            ["its sample".to_owned(), format!("{} replicates, seed {}", from.replicates, from.seed)],
+        ]);
+    }
+    let possible = case.error.is_none() && case.hash.is_some();
+    let decided = review.decisions.iter().find(|(id, _)| *id == checked.case);
+    let before = match (decided, &checked.rejected) {
+        (Some((_, super::Decision::Approve)), _) => Some("Approved in this review.".to_owned()),
+        (_, Some(why)) => Some(format!("This very image was rejected: {why}")),
+        _ => None,
+    };
+    let verb = if golden.is_some() || checked.golden.exists() { "replaces" } else { "makes" };
+    let approve = if possible {
+        format!("{verb} {}", checked.golden.display())
+    } else {
+        "There is no image to decide on.".to_owned()
+    };
+    Ok(Item {
+        id: checked.case.clone(),
+        scene: of.scene.clone(),
+        estimator: of.estimator.clone(),
+        renderer: of.renderer.clone(),
+        rays: of.rays,
+        outcome: review.outcome(&checked.case),
+        words: checked.text(),
+        verdicts: Vec::new(),
+        facts,
+        pairs,
+        decision: Some(viewer::Decision { approve, before, possible }),
+    })
+}
+
+/// Pixel by pixel; what pixels of one replicate have to do with each other does not matter
+/// to a test of one.
+fn pixels(image: &Sampled) -> IndependentPixels<'_> {
+    IndependentPixels {
+        mean: &image.mean,
+        variance: &image.variance,
+        replicates: image.replicates,
+        quantum: if image.rays > 0 { 1.0 / f64::from(image.rays) } else { 0.0 },
+    }
+}
+
+/// The image beside its golden.
+fn pair(golden: &Golden, image: &Sampled, planes: &mut Planes) -> Pair {
+    let size = image.resolution;
+    let noisy = |s: &Sampled| s.replicates > 1;
+    let p = (noisy(image) && noisy(&golden.image)).then(|| {
+        let (test, reference) = (pixels(image), pixels(&golden.image));
+        p_values(image.mean.len(), |i| test.mean(&[i]), |i| reference.mean(&[i]))
+    });
+    let flip = flip_map(size, &golden.image.mean, &image.mean);
+    let bits = |region: Region, bit: f32, all: &mut [f32]| {
+        for &i in golden.regions.get(&region).into_iter().flatten() {
+            if let Some(v) = all.get_mut(i) {
+                *v += bit;
+            }
+        }
+    };
+    let mut regions = vec![0.0; image.mean.len()];
+    for (i, region) in [Region::Footprint, Region::Left, Region::Right, Region::Far].into_iter().enumerate() {
+        bits(region, f32::from(1u8 << i), &mut regions);
+    }
+    Pair {
+        label: "against its golden".into(),
+        test: Named { name: "this image".into(), plane: planes.add(size, &image.mean, Detail::Exact) },
+        reference: Named { name: "golden".into(), plane: planes.add(size, &golden.image.mean, Detail::Exact) },
+        flip: flip.map(|map| planes.add(size, &map, Detail::Rounded)),
+        p: p.map(|p| planes.add(size, &p, Detail::Rounded)),
+        limit: LIMIT,
+        regions: Some(planes.add(size, &regions, Detail::Exact)),
+        transect: Vec::new(),
+        note: "Of 100 pixels that are alike, one has a p-value below 0.01 by chance.".into(),
+    }
+}
