@@ -210,7 +210,9 @@ impl Store {
             x.cmp(&y).then(dx.total_cmp(&dy))
         });
         match nearest {
-            None => Checked { case: name, golden: self.path(&slot), verdict: Verdict::Missing, others: all, rejected: None },
+            None => {
+                Checked { case: name, golden: self.path(&slot), verdict: Verdict::Missing, others: all, rejected: None }
+            }
             Some(i) => {
                 let Against { golden, verdict } = all.remove(i);
                 Checked { case: name, golden, verdict, others: all, rejected: None }

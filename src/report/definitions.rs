@@ -21,7 +21,13 @@ pub(super) fn of(record: &Record) -> Vec<[String; 2]> {
     ]
     .map(|(word, meaning)| [word.to_owned(), meaning.to_owned()])
     .to_vec();
-    words.push(["removed".to_owned(), format!("1 less max(0, dK) over dK of {classic}. 0 leaves the artifact, 1 takes it away.")]);
-    words.push(["over-darkening".to_owned(), format!("{classic} less the estimator, over the whole image. On a control 0 is right.")]);
+    words.push([
+        "removed".to_owned(),
+        format!("1 less max(0, dK) over dK of {classic}. 0 leaves the artifact, 1 takes it away."),
+    ]);
+    words.push([
+        "over-darkening".to_owned(),
+        format!("{classic} less the estimator, over the whole image. On a control 0 is right."),
+    ]);
     words
 }

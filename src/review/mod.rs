@@ -8,7 +8,9 @@ pub use server::{Ended, ReviewError, serve};
 
 use crate::{
     disk::DiskError,
-    golden::{Approval, ApproveError, Checked, Golden, Outcome, Rejected, Selection, Store, Verification, golden_cases},
+    golden::{
+        Approval, ApproveError, Checked, Golden, Outcome, Rejected, Selection, Store, Verification, golden_cases,
+    },
     record::{CaseRecord, Record},
     report::ReportError,
 };
@@ -72,7 +74,15 @@ impl Review {
     pub fn new(store: Store, folder: &Path, only: &str, all: bool) -> Result<Self, DiskError> {
         let record = Record::read(folder)?;
         let found = store.verify(folder, &record, only)?;
-        Ok(Review { store, folder: folder.to_owned(), record, only: only.to_owned(), all, found, decisions: Vec::new() })
+        Ok(Review {
+            store,
+            folder: folder.to_owned(),
+            record,
+            only: only.to_owned(),
+            all,
+            found,
+            decisions: Vec::new(),
+        })
     }
 
     /// The record.
@@ -125,8 +135,7 @@ impl Review {
                 format!("Approved: {golden}.")
             }
             Decision::Reject => {
-                let rejected =
-                    Rejected { case: case.to_owned(), pixel_hash: hash, reason: reason.to_owned() };
+                let rejected = Rejected { case: case.to_owned(), pixel_hash: hash, reason: reason.to_owned() };
                 self.store.reject(&rejected, &|| ())?;
                 format!("Rejected: {golden} stays as it is.")
             }

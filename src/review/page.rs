@@ -43,7 +43,9 @@ pub(super) fn html(review: &Review, token: &str) -> Result<String, ReportError> 
             (_, _, 1..) => "inconclusive",
             _ => "pass",
         },
-        summary: format!("{pass} hold, {fail} differ, {blind} too noisy to tell, {missing} missing or unusable, {lost} lost"),
+        summary: format!(
+            "{pass} hold, {fail} differ, {blind} too noisy to tell, {missing} missing or unusable, {lost} lost"
+        ),
         notes: found.stale.iter().map(crate::golden::Stale::line).collect(),
         gates: Vec::new(),
         items,

@@ -8,9 +8,8 @@ use crate::{
 /// FLIP a pixel, at [`DEFAULT_PPD`] pixels a degree; NaN where either image holds no
 /// number. None where there is nothing to compare.
 pub fn flip_map([width, height]: [u32; 2], reference: &[f32], test: &[f32]) -> Option<Vec<f32>> {
-    let image = |values: &[f32]| {
-        Image::new([width as usize, height as usize], vec![values.to_vec()], Encoding::Linear).ok()
-    };
+    let image =
+        |values: &[f32]| Image::new([width as usize, height as usize], vec![values.to_vec()], Encoding::Linear).ok();
     let (reference, test) = (image(reference)?, image(test)?);
     let pair = crate::metrics::image::Pair::new(&reference, &test, None).ok()?;
     let map = flip(&pair, DEFAULT_PPD).ok()?;

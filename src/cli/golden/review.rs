@@ -54,6 +54,9 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
         Ended::Interrupted => "interrupted",
     };
     let [approved, rejected] = [Decision::Approve, Decision::Reject].map(|d| review.count(d));
-    tell(&format!("review {how}: {approved} approved, {rejected} rejected, {} left", shown - (approved + rejected).min(shown)));
+    tell(&format!(
+        "review {how}: {approved} approved, {rejected} rejected, {} left",
+        shown - (approved + rejected).min(shown)
+    ));
     Ok(exit(review.verification()))
 }

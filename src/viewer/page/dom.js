@@ -57,14 +57,14 @@ function number(value) {
 /** The same with its sign. */
 const signed = (value) => (value > 0 ? "+" : "") + number(value);
 
-/** A table: column heads, then rows of cells (text or elements). */
-function table(heads, rows, attributes = {}) {
+/** A table of a name: column heads, then rows of cells (text or elements). */
+function table(name, heads, rows) {
   return el(
     "div",
-    { class: "scroll" },
+    { class: "scroll", tabindex: 0, role: "region", "aria-label": name },
     el(
       "table",
-      attributes,
+      {},
       el("thead", {}, el("tr", {}, heads.map((h) => el("th", { scope: "col" }, h)))),
       el("tbody", {}, rows.map((cells) => el("tr", {}, cells.map((c) => el("td", {}, c))))),
     ),

@@ -31,7 +31,7 @@ function fillGates() {
     return item ? el("button", { type: "button", class: "link", click: () => { showTab("cases"); choose(item, true); } }, id) : id;
   };
   const rows = data.gates.map((g) => [badge(g.outcome), el("span", {}, g.gate, el("div", { class: "reason" }, g.reason)), String(g.cases), nearest(g.nearest), g.value, g.limit]);
-  byId("tab-gates").replaceChildren(table(["", "gate", "verdicts", "nearest to its limit", "value", "limit"], rows));
+  byId("tab-gates").replaceChildren(table("Gates", ["outcome", "gate", "verdicts", "nearest to its limit", "value", "limit"], rows));
 }
 
 function fillAbout() {

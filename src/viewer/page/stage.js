@@ -39,6 +39,7 @@ class Stage {
     this.figures = el("div", { class: "panes" });
     this.toolbar = el("div", { class: "toolbar", role: "toolbar", "aria-label": "How the images are shown" });
     this.note = el("p", { class: "note" });
+    this.regions = el("div", { class: "legend", hidden: !view.outlined }, REGIONS.map((r) => el("span", { class: `swatch ${r.name}` }, r.name)));
     this.charts = el("div", {});
     this.root.replaceChildren(
       el("div", { class: "head" },
@@ -49,7 +50,7 @@ class Stage {
           el("button", { type: "button", click: () => step(1), title: "Next (j)" }, "next ›"))),
       ...(item.words ? [el("p", { class: "words" }, item.words)] : []),
       ...(decide ? [decide] : []),
-      ...(item.pairs.length ? [this.toolbar, this.note, this.figures, this.readout, this.charts] : [el("p", { class: "note" }, "There is no image of this case.")]),
+      ...(item.pairs.length ? [this.toolbar, this.note, this.figures, this.regions, this.readout, this.charts] : [el("p", { class: "note" }, "There is no image of this case.")]),
       ...this.details(item, scene),
     );
     if (item.pairs.length) this.refresh(true);
@@ -59,7 +60,7 @@ class Stage {
     const parts = [];
     if (item.verdicts.length) {
       const rows = item.verdicts.map((v) => [badge(v.outcome), [v.gate, el("div", { class: "reason" }, v.reason)], v.metric, v.value, v.limit, v.detectable]);
-      parts.push(el("h3", {}, "Verdicts"), table(["", "gate", "metric", "value", "limit", "detectable"], rows.map((r) => r.map((c) => (Array.isArray(c) ? el("span", {}, c) : c)))));
+      parts.push(el("h3", {}, "Verdicts"), table("Verdicts", ["outcome", "gate", "metric", "value", "limit", "detectable"], rows.map((r) => r.map((c) => (Array.isArray(c) ? el("span", {}, c) : c)))));
     }
     if (item.facts.length) {
       parts.push(el("h3", {}, "Numbers"), el("dl", { class: "facts" }, item.facts.map(([name, value]) => el("div", {}, el("dt", {}, name), el("dd", {}, value)))));
@@ -98,7 +99,9 @@ class Stage {
       flip: () => [one("flip")],
       p: () => [one("p")],
     }[this.mode]();
-    this.figures.className = `panes ${this.mode}`;
+    // Wide images stand one under the other, so that one place along them is in one line.
+    const wide = test.width > 2.2 * test.height;
+    this.figures.className = `panes ${this.mode}${wide && this.mode === "side" ? " stack" : ""}`;
     this.figures.replaceChildren(...this.panes.map((p) => p.element));
     this.panes.forEach((pane) => pane.fit());
     this.read(view.cursor);
@@ -164,6 +167,7 @@ class Stage {
 
   outline() {
     view.outlined = !view.outlined;
+    this.regions.hidden = !view.outlined;
     byId("outline")?.setAttribute("aria-pressed", String(view.outlined));
     this.draw();
   }
