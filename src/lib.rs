@@ -24,4 +24,5 @@ pub mod screen_camera;
 pub mod stats;
 pub mod suite;
 pub mod trace;
+mod untrusted;
 pub use aogauge_scenes as scenes;
