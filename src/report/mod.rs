@@ -106,7 +106,7 @@ pub fn write_markdown(record: &Record, record_folder: &Path, out: &Path) -> Resu
     Ok(())
 }
 
-/// A verdict's number and its limit, on one line: `contrast error is 0.30 [0.27, 0.34], at
+/// A verdict's number and its limit, on one line: `contrast-error is 0.30 [0.27, 0.34], at
 /// least 0.1: the limit holds`.
 fn in_a_line(verdict: &Verdict) -> String {
     let value = table::value_text(verdict.value(), verdict.interval);

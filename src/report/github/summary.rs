@@ -30,8 +30,13 @@ pub fn summary(record: &Record, images: Option<&ImageBase>, room: usize) -> Opti
     let mut text = head;
     for section in &sections {
         let mut kept = 0;
-        while let Some(row) = section.rows.get(kept).filter(|row| row.len() <= left) {
-            left -= row.len();
+        while let Some(row) = section.rows.get(kept) {
+            let Some(rest) = left.checked_sub(row.len()) else {
+                // A shorter row of less weight does not take its place.
+                left = 0;
+                break;
+            };
+            left = rest;
             kept += 1;
         }
         text += &section.text(kept);
