@@ -25,5 +25,6 @@ pub mod screen_camera;
 pub mod stats;
 pub mod suite;
 pub mod trace;
+mod untrusted;
 pub mod viewer;
 pub use aogauge_scenes as scenes;

@@ -5,10 +5,12 @@
 //! what a killed run left behind. Everything that differs between two runs of the
 //! same suite and seed stands under `timing`.
 
+mod end;
 mod folder;
 pub mod pictures;
 mod version;
 
+pub use end::End;
 pub use folder::RecordFolder;
 
 use crate::{
@@ -440,9 +442,14 @@ impl Record {
     /// Names become file names and image paths are followed, so neither may lead
     /// out of the folder they belong to.
     fn check_names(&self) -> Result<(), String> {
-        let cases = self.cases.iter().flat_map(|c| [&c.case.scene, &c.case.estimator, &c.case.renderer]);
-        let scenes = self.scenes.iter().map(|s| &s.name);
-        for name in cases.chain(scenes).chain(&self.suite.estimators) {
+        let others = self.verdicts.iter().filter_map(|v| v.against.as_ref()?.case.as_ref());
+        let judged = self.verdicts.iter().filter_map(|v| v.case.as_ref()).chain(others);
+        let cases = self.cases.iter().map(|c| &c.case).chain(judged);
+        let cases = cases.flat_map(|c| [&c.scene, &c.estimator, &c.renderer]);
+        let scenes = self.scenes.iter().map(|s| &s.name).chain(self.verdicts.iter().map(|v| &v.scene));
+        let pooled = self.pooled.iter().flat_map(|p| [&p.estimator, &p.renderer]);
+        let methods = self.suite.estimators.iter().chain(self.suite.methods.keys()).chain([&self.suite.classic]);
+        for name in cases.chain(scenes).chain(pooled).chain(methods) {
             check_name(name)?;
         }
         let of_cases = self.cases.iter().filter_map(|c| c.image.as_ref());
@@ -451,7 +458,13 @@ impl Record {
         let of_verdicts = self.verdicts.iter().filter_map(|v| v.picture.as_ref());
         for image in of_cases.chain(of_scenes).chain(of_judges).chain(of_verdicts) {
             if !Path::new(image).components().all(|c| matches!(c, Component::Normal(_))) {
-                return Err(format!("the image path '{image}' leads out of the record"));
+                return Err(format!("the image path '{}' leads out of the record", image.escape_debug()));
+            }
+            if !image.chars().all(|c| c.is_ascii_alphanumeric() || "-_./".contains(c)) || image.is_empty() {
+                return Err(format!(
+                    "the image path '{}' may hold letters, digits, '-', '_', '.' and '/' only",
+                    image.escape_debug()
+                ));
             }
         }
         Ok(())

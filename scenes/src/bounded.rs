@@ -267,7 +267,8 @@ pub fn check_name(name: &str) -> Result<(), String> {
     let legal = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
     if name.is_empty() || name.len() > 64 || name.starts_with('.') || !name.chars().all(legal) {
         return Err(format!(
-            "'{name}' is not a legal name: use 1 to 64 letters, digits, '-', '_' and '.', not beginning with '.'"
+            "'{}' is not a legal name: use 1 to 64 letters, digits, '-', '_' and '.', not beginning with '.'",
+            name.escape_debug()
         ));
     }
     Ok(())

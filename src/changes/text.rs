@@ -4,6 +4,7 @@ use super::{
     Changes,
     tables::{Cell, Table, runs, sentences, tables},
 };
+use crate::untrusted::logged as line;
 
 /// Everything that changed, as aligned tables.
 pub fn text(changes: &Changes) -> String {
@@ -28,11 +29,6 @@ fn words(table: &Table) -> Vec<Vec<String>> {
     };
     let header = table.columns.iter().map(|c| (*c).to_owned()).collect();
     std::iter::once(header).chain(table.rows.iter().map(|r| r.iter().map(word).collect())).collect()
-}
-
-/// Names come from files: no control character may reach the terminal.
-fn line(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
 /// Columns of equal width; the last one is as long as it is.

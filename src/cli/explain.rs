@@ -5,6 +5,7 @@ use crate::{
     gate::{Outcome, Verdict, words},
     record::Record,
     report::table::outcome_text,
+    untrusted::logged,
 };
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -144,7 +145,7 @@ impl Explanation {
         text.push('\n');
         let gate = self.gate.iter().map(|g| format!("Gate: {g}"));
         for paragraph in gate.chain(self.text.iter().cloned()) {
-            text += &wrap(&paragraph);
+            text += &wrap(&logged(&paragraph));
         }
         text
     }

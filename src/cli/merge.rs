@@ -2,6 +2,7 @@
 
 use super::{
     Exit, Failure, Format,
+    report::Beside,
     run::{bar, base, finish},
 };
 use crate::{
@@ -30,6 +31,8 @@ pub struct Args {
     /// The folder of an earlier record, for gates `against = "base"`.
     #[arg(long, value_name = "DIR")]
     base: Option<PathBuf>,
+    #[command(flatten)]
+    beside: Beside,
     /// What is printed on standard output: nothing, or the record.
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -43,6 +46,7 @@ impl From<MergeError> for Failure {
 }
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
+    args.beside.check(args.format)?;
     let shards = Shards::read(&find_shards(&args.shards)?)?;
     let first = shards.first();
     let suite = Suite::load(args.suite.as_deref().unwrap_or(&first.suite))?;
@@ -55,5 +59,5 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     let prepared = Prepared::new(&plan)?;
     let folder = RecordFolder::create(&args.out)?;
     let record = shards.merge(&prepared, &folder, &bar())?;
-    finish(&record, &folder, args.format)
+    finish(&record, &folder, &args.beside, args.format)
 }

@@ -17,7 +17,13 @@ mod scene;
 mod schema;
 
 use crate::{
-    disk::DiskError, render::RenderError, report::ReportError, run::RunError, scenes::SceneError, suite::SuiteError,
+    disk::DiskError,
+    record::{End, Record},
+    render::RenderError,
+    report::ReportError,
+    run::RunError,
+    scenes::SceneError,
+    suite::SuiteError,
 };
 use clap::{Parser, Subcommand, ValueEnum};
 
@@ -39,6 +45,18 @@ pub enum Exit {
     Incomplete = 5,
     /// The data do not decide.
     Inconclusive = 6,
+}
+
+impl Exit {
+    /// How a run that made this record ends.
+    fn of(record: &Record) -> Self {
+        match record.end() {
+            End::Incomplete => Exit::Incomplete,
+            End::Fail => Exit::Failed,
+            End::Inconclusive => Exit::Inconclusive,
+            End::Pass => Exit::Pass,
+        }
+    }
 }
 
 /// Judges the image quality of ambient-occlusion renderers.

@@ -1,24 +1,161 @@
-//! `aogauge report`
+//! `aogauge report`, and the reports that `run` and `merge` write.
 
-use super::{Exit, Failure, tell};
-use crate::report;
-use std::path::PathBuf;
+use super::{Exit, Failure, Format as Printed, json, print, tell};
+use crate::{
+    record::Record,
+    report::{
+        self, Format,
+        digest::Digest,
+        github::{self, ImageBase, Written},
+        html, junit,
+    },
+    untrusted::logged,
+};
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+};
 
-/// Make the report of a record again, without rendering.
+/// Make the reports of a record, without rendering: to read, and for CI systems.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  aogauge report reports/latest --out reports/copy")]
+#[command(after_help = "Examples:\n  aogauge report reports/latest --out reports/copy\n  \
+aogauge report reports/latest --format markdown,html,junit\n  \
+aogauge report reports/latest --format github --image-base https://example.org/reports/42 --gate\n  \
+aogauge report reports/latest --format json | jq -r '.failures[].subject'\n\n\
+Exit codes: 0 the reports are made, 2 they cannot be. With --gate, where they are made, as the run's:\n\
+0 pass, 1 a gate failed, 5 incomplete, 6 inconclusive. docs/reports.md tells more.")]
 pub struct Args {
     /// The record's folder.
     record: PathBuf,
-    /// Folder for report.md and its pictures; the record's unless given.
+    /// What to make, one or several.
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "markdown")]
+    format: Vec<Format>,
+    /// Folder for the files; the record's unless given.
     #[arg(long)]
     out: Option<PathBuf>,
+    /// Where the record's folder can be seen on the web: the summary on GitHub shows
+    /// pictures of what did not pass, which it can by no other way.
+    #[arg(long, value_name = "URL")]
+    image_base: Option<ImageBase>,
+    /// Exit as the run did.
+    #[arg(long)]
+    gate: bool,
+}
+
+/// What `run` and `merge` make of the record that they write.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub(super) struct Beside {
+    /// Reports to make of the record, one or several.
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "markdown", value_name = "FORMAT")]
+    report: Vec<Format>,
+    /// With --report github: where the folder can be seen on the web, for pictures.
+    #[arg(long, value_name = "URL")]
+    image_base: Option<ImageBase>,
+}
+
+impl Beside {
+    /// Refuses what contradicts itself, before anything is rendered.
+    pub(super) fn check(&self, printed: Printed) -> Result<(), Failure> {
+        if self.report.contains(&Format::Json) && printed == Printed::Json {
+            return Err(Failure::usage(
+                "--report json and --format json both print on standard output: leave out one, or make the other by \
+                 aogauge report",
+            ));
+        }
+        check(&self.report, self.image_base.as_ref(), "--report")
+    }
+
+    /// Makes them beside the record. Returns the files.
+    pub(super) fn make(&self, record: &Record, folder: &Path, printed: Printed) -> Result<Vec<PathBuf>, Failure> {
+        let images = self.image_base.as_ref();
+        Wanted { formats: &self.report, images, folder, out: folder, printed }.make(record)
+    }
 }
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
-    let out = args.out.as_ref().unwrap_or(&args.record);
-    let record = report::write(&args.record, out)?;
-    report::html::write(&args.record, out)?;
-    tell(&format!("{}: {}", out.join(report::FILE).display(), record.summary_line()));
-    Ok(Exit::Pass)
+    check(&args.format, args.image_base.as_ref(), "--format")?;
+    let record = Record::read(&args.record)?;
+    let (formats, images, folder) = (&args.format[..], args.image_base.as_ref(), args.record.as_path());
+    let wanted = Wanted { formats, images, folder, out: args.out.as_deref().unwrap_or(folder), printed: Printed::Text };
+    let files = wanted.make(&record)?;
+    tell(&told(&files, &record.summary_line()));
+    Ok(if args.gate { Exit::of(&record) } else { Exit::Pass })
+}
+
+/// The files, and what there is to say of them.
+pub(super) fn told(files: &[PathBuf], what: &str) -> String {
+    let files: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
+    if files.is_empty() { what.to_owned() } else { format!("{}: {what}", files.join(", ")) }
+}
+
+fn check(formats: &[Format], images: Option<&ImageBase>, option: &str) -> Result<(), Failure> {
+    if images.is_some() && !formats.contains(&Format::Github) {
+        return Err(Failure::usage(format!("--image-base is of use with {option} github only")));
+    }
+    Ok(())
+}
+
+/// What is made of a record, and where.
+struct Wanted<'a> {
+    formats: &'a [Format],
+    images: Option<&'a ImageBase>,
+    /// The record's.
+    folder: &'a Path,
+    out: &'a Path,
+    /// Whether something else is printed for programs.
+    printed: Printed,
+}
+
+impl Wanted<'_> {
+    /// Makes all, what is printed last. Returns the files without their pictures.
+    fn make(&self, record: &Record) -> Result<Vec<PathBuf>, Failure> {
+        let mut files = Vec::new();
+        let wants = |format| self.formats.contains(&format);
+        if wants(Format::Markdown) {
+            report::write_markdown(record, self.folder, self.out)?;
+            files.push(self.out.join(report::FILE));
+        }
+        if wants(Format::Html) {
+            files.push(html::write(record, self.folder, self.out)?);
+        }
+        if wants(Format::Junit) {
+            let (path, xml) = (self.out.join(junit::FILE), junit::xml(record)?);
+            crate::disk::write_whole(&path, |buffer| buffer.write_all(xml.as_bytes()))?;
+            files.push(path);
+        }
+        if wants(Format::Github) {
+            // The runner reads annotations from both streams; a script reads JSON from one.
+            let is_read = wants(Format::Json) || self.printed == Printed::Json;
+            files.push(self.github(record, is_read)?);
+        }
+        if wants(Format::Json) {
+            print(&json(&Digest::new(record, Exit::of(record) as u8, &files))?)?;
+        }
+        Ok(files)
+    }
+
+    /// Writes the summary and prints the annotations. Returns the summary's file.
+    fn github(&self, record: &Record, is_read: bool) -> Result<PathBuf, Failure> {
+        let runner = std::env::var_os(github::VARIABLE).filter(|path| !path.is_empty()).map(PathBuf::from);
+        let written = github::write(record, self.images, runner.as_deref(), self.out)?;
+        let lines: String = github::annotations(record).into_iter().map(|line| line + "\n").collect();
+        if is_read {
+            tell(lines.trim_end());
+        } else {
+            print(&lines)?;
+        }
+        Ok(match written {
+            Written::Appended(path) => path,
+            Written::Alone(path) => {
+                let why = format!("{} is not set", github::VARIABLE);
+                tell(&format!("aogauge: {why}: the summary is in {}", logged(&path.display().to_string())));
+                path
+            }
+            Written::NoRoom(path) => {
+                let what = "what this step wrote before leaves the summary no room";
+                tell(&format!("aogauge: {what}: it is in {}", logged(&path.display().to_string())));
+                path
+            }
+        })
+    }
 }

@@ -3,7 +3,13 @@
 mod dry_run;
 mod interrupt;
 
-use super::{Exit, Failure, Format, json, on_gpu::OnGpu, print, tell};
+use super::{
+    Exit, Failure, Format, json,
+    on_gpu::OnGpu,
+    print,
+    report::{Beside, told},
+    tell,
+};
 use crate::{
     gate::Gate,
     judge_cache::JudgeCache,
@@ -27,12 +33,12 @@ use std::{
 /// Render a suite, measure, judge, and write a record and its report.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  aogauge run\n  aogauge run my-suite.toml --out reports/mine\n  \
-aogauge run --seed 7 --renderer cpu --format json")]
+aogauge run --seed 7 --renderer cpu --format json\n  aogauge run --report markdown,junit,github")]
 pub struct Args {
     /// A built-in suite by name, or a suite file.
     #[arg(default_value = "thin-occluders")]
     suite: String,
-    /// Folder for record.json, report.md and the images. An older record of that
+    /// Folder for record.json, its reports and the images. An older record of that
     /// name is moved aside to NAME.previous.
     #[arg(long, default_value = "reports/latest")]
     out: PathBuf,
@@ -54,7 +60,7 @@ pub struct Args {
     filter: Option<String>,
     /// Only a part of the run, for `aogauge merge`: K/N, or auto for what GitLab, Slurm,
     /// Kubernetes, GitHub Actions or AOGAUGE_SHARD say.
-    #[arg(long, value_name = "K/N")]
+    #[arg(long, value_name = "K/N", conflicts_with_all = ["report", "image_base"])]
     shard: Option<String>,
     /// Begin with 4 replicates, and add to them where a verdict is not decided yet. The
     /// error level is kept. Clear cases end early, others go beyond the suite's replicates.
@@ -86,6 +92,8 @@ pub struct Args {
     /// user's cache folder, and leave none.
     #[arg(long)]
     no_cache: bool,
+    #[command(flatten)]
+    beside: Beside,
     /// What is printed on standard output: nothing, or the record.
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -138,6 +146,7 @@ pub(super) fn bar() -> Bar {
 }
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
+    args.beside.check(args.format)?;
     let suite = Suite::load(&args.suite)?;
     let shard = args.shard.as_deref().map(named).transpose()?;
     let (gpu, missing) = open(args)?;
@@ -215,7 +224,7 @@ fn prepare(
     if let Some(trouble) = &record.timing.cache_trouble {
         tell(&format!("aogauge: the judge's images are not kept for the next run: {trouble}"));
     }
-    finish(&record, &folder, args.format)
+    finish(&record, &folder, &args.beside, args.format)
 }
 
 /// The folder of the record, as an unfinished run of the same plan left it.
@@ -236,27 +245,23 @@ fn folder(
     Ok(folder)
 }
 
-/// Writes the report, and says how it went.
-pub(super) fn finish(record: &Record, folder: &RecordFolder, format: Format) -> Result<Exit, Failure> {
-    report::write(folder.path(), folder.path())?;
-    tell(&format!(
-        "{}\n{}\n{}: {}",
-        report::table::plain(record),
-        record.summary_line(),
-        folder.path().join(report::FILE).display(),
-        match exit(record) {
-            Exit::Pass if record.verdicts.is_empty() => "rendered; the suite has no gates",
-            Exit::Pass => "pass",
-            _ => "not a pass",
-        },
-    ));
+/// Makes the reports, and says how it went.
+pub(super) fn finish(record: &Record, folder: &RecordFolder, beside: &Beside, format: Format) -> Result<Exit, Failure> {
+    let files = beside.make(record, folder.path(), format)?;
+    let exit = Exit::of(record);
+    let end = match exit {
+        Exit::Pass if record.verdicts.is_empty() => "rendered; the suite has no gates",
+        Exit::Pass => "pass",
+        _ => "not a pass",
+    };
+    tell(&format!("{}\n{}\n{}", report::table::plain(record), record.summary_line(), told(&files, end)));
     if record.incomplete.is_some() {
         tell("aogauge: what is done is kept: the same command goes on from here");
     }
     if format == Format::Json {
         print(&json(record)?)?;
     }
-    Ok(exit(record))
+    Ok(exit)
 }
 
 fn end_of_shard(args: &Args, record: &ShardRecord, folder: &RecordFolder) -> Result<Exit, Failure> {
@@ -301,19 +306,6 @@ fn open(args: &Args) -> Result<(Option<Result<Gpu, RenderError>>, String), Failu
             Err(e) if args.on_gpu.is_given() => return Err(Failure::usage(e.to_string())),
             Err(e) => (None, e.to_string()),
         }),
-    }
-}
-
-fn exit(record: &Record) -> Exit {
-    let s = &record.summary;
-    if s.failed_cases + s.failed_judges > 0 || record.incomplete.is_some() {
-        Exit::Incomplete
-    } else if s.fail > 0 {
-        Exit::Failed
-    } else if s.inconclusive > 0 {
-        Exit::Inconclusive
-    } else {
-        Exit::Pass
     }
 }
 
@@ -367,6 +359,7 @@ within = 0.001
             fresh: true,
             no_cache: true,
             on_gpu: OnGpu::default(),
+            beside: Beside::default(),
             format: Format::Text,
         };
         // The first case loads, compiles and runs by then.

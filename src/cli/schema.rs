@@ -3,7 +3,7 @@
 use super::{Exit, Failure, explain::Explanations, golden, json, print};
 use crate::{
     bench::GpuBench, changes::Changes, compare::Comparison, flatland::Study, golden::Verification, record::Record,
-    scenes::Scene, suite::SuiteFile,
+    report::digest::Digest, scenes::Scene, suite::SuiteFile,
 };
 use clap::ValueEnum;
 
@@ -35,6 +35,8 @@ enum Of {
     Explain,
     /// What `compare --format json` prints of two records.
     Changes,
+    /// What `report --format json` prints.
+    Report,
     /// What `golden verify --format json` prints.
     GoldenVerify,
     /// What `golden list --format json` prints.
@@ -52,6 +54,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
         Of::Compare => schemars::schema_for!(Comparison),
         Of::Explain => schemars::schema_for!(Explanations),
         Of::Changes => schemars::schema_for!(Changes),
+        Of::Report => schemars::schema_for!(Digest),
         Of::GoldenVerify => schemars::schema_for!(Verification),
         Of::GoldenList => schemars::schema_for!(golden::Listing),
         Of::GoldenSize => schemars::schema_for!(golden::Sizes),

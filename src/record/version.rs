@@ -10,6 +10,7 @@
 //! in the JSON before it is read.
 
 use super::{OLDEST, Record, VERSION};
+use crate::untrusted::{cut, line};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -21,9 +22,10 @@ pub(super) fn parse(text: &str) -> Result<Record, String> {
         #[serde(default)]
         tool: Option<String>,
     }
-    let malformed = |e: serde_json::Error| format!("not a record: {e}");
+    // The error may name a field as the file has it.
+    let malformed = |e: serde_json::Error| format!("not a record: {}", cut(&line(&e.to_string()), 500));
     let Versioned { version, tool } = serde_json::from_str(text).map_err(malformed)?;
-    let by = tool.map_or_else(String::new, |t| format!(" {t}"));
+    let by = tool.map_or_else(String::new, |t| format!(" {}", cut(&line(&t), 40)));
     match version {
         VERSION => serde_json::from_str(text).map_err(malformed),
         OLDEST => {

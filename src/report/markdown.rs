@@ -8,11 +8,16 @@ use super::{
     table::{self, Row, detectable_text, outcome_text, plus_minus, value_text},
 };
 use crate::{
-    gate::{CONFIDENCE, Outcome},
+    gate::CONFIDENCE,
     metrics::{Metric, MetricName, artifact::Brighter, regions::Region},
     record::{CaseRecord, Record, SceneRecord, ScreenRecord, Stopped},
+    untrusted::markdown_source,
 };
-use minijinja::{Environment, syntax::SyntaxConfig, value::Serde};
+use minijinja::{
+    Environment,
+    syntax::SyntaxConfig,
+    value::{Serde, Value},
+};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -225,7 +230,7 @@ fn section(record: &Record, scene: &SceneRecord) -> SceneSection {
     let cases: Vec<&CaseRecord> = record.cases.iter().filter(|c| c.case.scene == scene.name).collect();
     let (convergence, convergence_notes) = convergence::rows(record, scene);
     let failed_judge = scene.judge_error.iter().cloned();
-    let failed = cases.iter().filter_map(|c| Some(format!("`{}`: {}", c.case.id(), c.error.as_ref()?)));
+    let failed = cases.iter().filter_map(|c| Some(format!("{}: {}", c.case.id(), c.error.as_ref()?)));
     SceneSection {
         name: scene.name.clone(),
         description: scene.description.clone(),
@@ -268,16 +273,16 @@ fn absent(cases: &[&CaseRecord]) -> Vec<String> {
     notes
 }
 
-/// Cells of a table must not end it.
-fn cell(text: &str) -> String {
-    text.replace('|', "\\|").replace('\n', " ")
-}
-
 /// Writes the report's text.
 pub fn text(record: &Record) -> Result<String, minijinja::Error> {
     let mut environment = Environment::new();
     environment.set_syntax(SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build()?);
-    environment.add_filter("cell", |s: String| cell(&s));
+    // All text that a record brings, whether or not the template asks for it.
+    environment.set_formatter(|out, state, value| match value.as_str() {
+        Some(text) if !value.is_safe() => Ok(out.write_str(&markdown_source(text))?),
+        _ => minijinja::escape_formatter(out, state, value),
+    });
+    environment.add_filter("cell", |s: String| Value::from_safe_string(markdown_source(&s)));
     environment.add_template("report", include_str!("report.md.j2"))?;
     let verdicts: Vec<VerdictRow> = record
         .verdicts
@@ -293,15 +298,7 @@ pub fn text(record: &Record) -> Result<String, minijinja::Error> {
         })
         .collect();
     let rows: Vec<Row> = table::rows(record);
-    let headline = if record.summary.failed_cases + record.summary.failed_judges > 0 {
-        "INCOMPLETE"
-    } else if record.summary.fail > 0 {
-        outcome_text(Outcome::Fail)
-    } else if record.summary.inconclusive > 0 {
-        outcome_text(Outcome::Inconclusive)
-    } else {
-        outcome_text(Outcome::Pass)
-    };
+    let headline = record.end().text();
     let scenes: Vec<SceneSection> = record.scenes.iter().map(|s| section(record, s)).collect();
     let judge_seconds: f64 = record.timing.judges.values().sum();
     let (pooled, pooled_scenes) = pooled::rows(record);

@@ -1,12 +1,15 @@
-//! Reports: a record becomes Markdown with its pictures. Nothing here renders; a
-//! report can be made again from a record at any time.
+//! Reports: a record becomes Markdown with its pictures, and what CI systems read. Nothing
+//! here renders; a report can be made again from a record at any time.
 
 pub mod bench;
 mod convergence;
 mod definitions;
+pub mod digest;
 mod error_maps;
 pub mod flatland;
+pub mod github;
 pub mod html;
+pub mod junit;
 mod markdown;
 mod occluders;
 pub(crate) mod picture;
@@ -16,15 +19,32 @@ pub mod table;
 
 use crate::{
     disk::{DiskError, write_whole},
+    gate::Verdict,
     layers::Layers,
     metrics::judge::too_noisy,
     picture::error_map::MapError,
     record::{Record, SceneRecord, pictures::MEASURE},
+    untrusted,
 };
 use std::{collections::BTreeMap, io::Write, path::Path};
 
 /// The name of the report in its folder.
 pub const FILE: &str = "report.md";
+
+/// What a record is made into.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// report.md and its pictures.
+    Markdown,
+    /// report.html: one file to look around in, with all images.
+    Html,
+    /// junit.xml, for the test reports of Jenkins, GitLab and GitHub.
+    Junit,
+    /// The job's summary on GitHub, and at most 10 annotations on standard output.
+    Github,
+    /// What came of the gates, on standard output, for scripts.
+    Json,
+}
 
 /// Why a report could not be made.
 #[derive(Debug, thiserror::Error)]
@@ -69,6 +89,9 @@ pub enum ReportError {
     /// The built-in template failed.
     #[error("the report template failed: {0}")]
     Template(#[from] minijinja::Error),
+    /// The test report could not be put into XML.
+    #[error("the test report cannot be written as XML: {0}")]
+    Xml(#[from] quick_junit::SerializeError),
 }
 
 /// Makes `report.md` and its pictures from the record in `record_folder`, into
@@ -78,13 +101,38 @@ pub enum ReportError {
 /// Where the record or an image cannot be read, or the report not written.
 pub fn write(record_folder: &Path, out: &Path) -> Result<Record, ReportError> {
     let record = Record::read(record_folder)?;
-    for scene in &record.scenes {
-        pictures(record_folder, &record, scene, &out.join(markdown::PICTURES).join(&scene.name))?;
-    }
-    error_maps::bars(&record, &out.join(markdown::PICTURES))?;
-    let text = markdown::text(&record)?;
-    write_whole(&out.join(FILE), |buffer| buffer.write_all(text.as_bytes()))?;
+    write_markdown(&record, record_folder, out)?;
     Ok(record)
+}
+
+/// Makes `report.md` and its pictures from a record that was read from `record_folder`,
+/// into `out`.
+///
+/// # Errors
+/// Where an image cannot be read, or the report not written.
+pub fn write_markdown(record: &Record, record_folder: &Path, out: &Path) -> Result<(), ReportError> {
+    for scene in &record.scenes {
+        pictures(record_folder, record, scene, &out.join(markdown::PICTURES).join(&scene.name))?;
+    }
+    error_maps::bars(record, &out.join(markdown::PICTURES))?;
+    let text = markdown::text(record)?;
+    write_whole(&out.join(FILE), |buffer| buffer.write_all(text.as_bytes()))?;
+    Ok(())
+}
+
+/// A verdict's number and its limit, on one line: `contrast-error is 0.30 [0.27, 0.34], at
+/// least 0.1: the limit holds`.
+fn in_a_line(verdict: &Verdict) -> String {
+    let value = table::value_text(verdict.value(), verdict.interval);
+    let text = format!("{} is {value}, must be {}: {}", verdict.title(), verdict.limit.text(), verdict.reason);
+    untrusted::line(&text)
+}
+
+/// What ended with an error, and why: cases by their id, judges as `scene (judge)`.
+fn errors(record: &Record) -> impl Iterator<Item = (String, &str)> {
+    let judges = record.scenes.iter().filter_map(|s| Some((format!("{} (judge)", s.name), s.judge_error.as_deref()?)));
+    let cases = record.cases.iter().filter_map(|c| Some((c.case.id(), c.error.as_deref()?)));
+    judges.chain(cases)
 }
 
 fn layer(layers: &Layers, image: &str, name: &str) -> Result<Vec<f32>, ReportError> {

@@ -4,6 +4,7 @@
 use crate::{
     gate::{Outcome, Verdict},
     record::Record,
+    untrusted::logged,
 };
 use serde::Serialize;
 
@@ -115,15 +116,16 @@ pub fn plain(record: &Record) -> String {
     let mut text = String::new();
     for r in &rows {
         let Row { outcome, gate, nearest, value, detectable, limit, cases, .. } = r;
+        let (gate, nearest) = (logged(gate), logged(nearest));
         text += &format!(
             "{outcome:<a$}  {gate:<b$}  {cases:>3}x  {nearest:<c$}  {value:<d$}  sees {detectable:<e$}  {limit}\n"
         );
         if let Some(reason) = &r.reason {
-            text += &format!("{:a$}  {reason}\n", "");
+            text += &format!("{:a$}  {}\n", "", logged(reason));
         }
     }
     for idle in &record.idle_gates {
-        text += &format!("{:<a$}  {}: {}\n", "NOT RUN", idle.gate, idle.reason);
+        text += &format!("{:<a$}  {}: {}\n", "NOT RUN", logged(&idle.gate), logged(&idle.reason));
     }
     text
 }

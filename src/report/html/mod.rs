@@ -11,21 +11,25 @@ use crate::{
     viewer::{Page, Planes},
 };
 pub(crate) use pairs::SceneImages;
-use std::{collections::BTreeMap, io::Write, path::Path};
+use std::{
+    collections::BTreeMap,
+    io::Write,
+    path::{Path, PathBuf},
+};
 
 /// The name of the page in its folder.
 pub const FILE: &str = "report.html";
 
-/// Makes `report.html` from the record in `record_folder`, into `out`. Returns the
-/// record.
+/// Makes `report.html` from a record that was read from `record_folder`, into `out`.
+/// Returns its file.
 ///
 /// # Errors
-/// Where the record or an image cannot be read, or the page not written.
-pub fn write(record_folder: &Path, out: &Path) -> Result<Record, ReportError> {
-    let record = Record::read(record_folder)?;
-    let html = page(record_folder, &record)?;
-    write_whole(&out.join(FILE), |buffer| buffer.write_all(html.as_bytes()))?;
-    Ok(record)
+/// Where an image cannot be read, or the page not written.
+pub fn write(record: &Record, record_folder: &Path, out: &Path) -> Result<PathBuf, ReportError> {
+    let path = out.join(FILE);
+    let html = page(record_folder, record)?;
+    write_whole(&path, |buffer| buffer.write_all(html.as_bytes()))?;
+    Ok(path)
 }
 
 /// The page of a record.
