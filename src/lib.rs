@@ -6,6 +6,7 @@ mod claim;
 pub mod cli;
 pub mod compare;
 pub mod disk;
+pub mod escape;
 pub mod flatland;
 pub mod gate;
 pub mod golden;

@@ -105,7 +105,7 @@ fn imported() -> (Record, String) {
     let folder = RecordFolder::create(&out).unwrap();
     let machine = Machine::here("a test".into(), None);
     let record = Prepared::new(&plan).unwrap().run(&Means::new(&Cpu, machine), &folder, &Silent).unwrap();
-    assert_eq!(report::write(&out, &out).unwrap(), record);
+    assert_eq!(report::write(&out, &out, &report::Options::default()).unwrap(), record);
     let text = fs::read_to_string(out.join("report.md")).unwrap();
     (record, text)
 }

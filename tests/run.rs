@@ -88,7 +88,7 @@ within = 0.01
     assert_eq!(failed[0].case.id(), "plane/classic/gpu/8");
     assert!(failed[0].error.as_deref().unwrap().contains("unplugged"));
 
-    let read = report::write(&out, &out).unwrap();
+    let read = report::write(&out, &out, &report::Options::default()).unwrap();
     assert_eq!(read, record);
     assert_eq!(Record::read(&out).unwrap(), record);
     let report = std::fs::read_to_string(out.join("report.md")).unwrap();
@@ -186,7 +186,7 @@ fn a_converged_image_that_is_no_number_costs_its_method() {
             _ => assert_eq!(error, ""),
         }
     }
-    report::write(&out, &out).unwrap();
+    report::write(&out, &out, &report::Options::default()).unwrap();
     assert!(std::fs::read_to_string(out.join("report.md")).unwrap().contains("INCOMPLETE"));
 }
 
@@ -271,7 +271,9 @@ within = 0.01
         assert_eq!(v.detectable.is_none(), exact, "{v:?}");
         assert!(v.detectable.is_none_or(|d| d > 0.0));
     }
-    let markdown = report::write(&out, &out).map(|_| std::fs::read_to_string(out.join("report.md")).unwrap()).unwrap();
+    let markdown = report::write(&out, &out, &report::Options::default())
+        .map(|_| std::fs::read_to_string(out.join("report.md")).unwrap())
+        .unwrap();
     for part in ["## All scenes together", "| detectable |", "<summary>Convergence</summary>", "MAE against Q"] {
         assert!(markdown.contains(part), "{part}");
     }

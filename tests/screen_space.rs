@@ -283,7 +283,7 @@ kind = "gtao"
     let contrast = |case: usize| record.cases[case].metric(MetricName::Contrast, None).unwrap();
     assert!(contrast(0).value.is_some());
     assert!(contrast(1).value.is_none() && contrast(1).note.as_deref().unwrap().contains("fewer than 64"));
-    aogauge::report::write(folder.path(), folder.path()).unwrap();
+    aogauge::report::write(folder.path(), folder.path(), &aogauge::report::Options::default()).unwrap();
     let report = std::fs::read_to_string(folder.path().join("report.md")).unwrap();
     assert!(report.contains("Screen-space methods are computed") && report.contains("of 256"), "{report}");
 }

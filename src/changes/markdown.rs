@@ -4,6 +4,7 @@ use super::{
     Changes, Outcome, Turn,
     tables::{Cell, Table, runs, sentences, tables},
 };
+use crate::escape;
 
 /// A comment has this many bytes at most: GitHub drops one of 65,536 characters whole.
 pub const MAX_BYTES: usize = 65_535;
@@ -119,30 +120,13 @@ fn cell_of(of: &Cell) -> String {
     }
 }
 
-/// Text as it reads, whatever it holds: no Markdown, no HTML, no end of the cell, no
-/// mention of a person and no link. Cut at 200 characters.
+/// Text as it reads, whatever it holds ([`escape::markdown`]), cut at 200 characters.
 fn cell(text: &str) -> String {
-    let mut safe = String::new();
-    for (i, c) in text.chars().enumerate() {
-        if i == CELL {
-            safe.push('…');
-            break;
-        }
-        match c {
-            '&' => safe += "&amp;",
-            '<' => safe += "&lt;",
-            '>' => safe += "&gt;",
-            '|' | '`' | '*' | '_' | '[' | ']' | '\\' | '~' | '$' | '!' => safe += &format!("&#{};", u32::from(c)),
-            // A space without width keeps what follows from becoming a link.
-            '@' | '#' => safe += &format!("&#{};\u{200b}", u32::from(c)),
-            ':' if text.chars().nth(i + 1) == Some('/') => safe += ":\u{200b}",
-            // Marks that turn the direction of text would let a name read as another.
-            '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => {}
-            c if c.is_control() => safe.push(' '),
-            c => safe.push(c),
-        }
+    let mut short: String = text.chars().take(CELL).collect();
+    if short.len() < text.len() {
+        short.push('…');
     }
-    safe
+    escape::markdown(&short)
 }
 
 #[cfg(test)]
@@ -158,7 +142,7 @@ mod tests {
             ("[x](http://y)", "&#91;x&#93;(http:\u{200b}//y)"),
             ("**_`~\\", "&#42;&#42;&#95;&#96;&#126;&#92;"),
             ("@me #1", "&#64;\u{200b}me &#35;\u{200b}1"),
-            ("a\u{202e}b\u{7}", "ab "),
+            ("a\u{202e}b\u{7}c", "ab c"),
         ] {
             assert_eq!(cell(text), expected, "{text}");
         }

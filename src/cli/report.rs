@@ -13,11 +13,15 @@ pub struct Args {
     /// Folder for report.md and its pictures; the record's unless given.
     #[arg(long)]
     out: Option<PathBuf>,
+    /// Put the pictures into report.md as data URIs, so that it is one file. GitHub does
+    /// not show such pictures.
+    #[arg(long)]
+    embed_images: bool,
 }
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
     let out = args.out.as_ref().unwrap_or(&args.record);
-    let record = report::write(&args.record, out)?;
+    let record = report::write(&args.record, out, &report::Options { embed_images: args.embed_images })?;
     tell(&format!("{}: {}", out.join(report::FILE).display(), record.summary_line()));
     Ok(Exit::Pass)
 }

@@ -238,7 +238,7 @@ fn folder(
 
 /// Writes the report, and says how it went.
 pub(super) fn finish(record: &Record, folder: &RecordFolder, format: Format) -> Result<Exit, Failure> {
-    report::write(folder.path(), folder.path())?;
+    report::write(folder.path(), folder.path(), &report::Options::default())?;
     tell(&format!(
         "{}\n{}\n{}: {}",
         report::table::plain(record),
