@@ -44,6 +44,8 @@ struct GateSection {
     gate: String,
     metric: String,
     verdicts: Vec<Row>,
+    /// Which pixels they were measured on, each once.
+    places: Vec<String>,
     /// Verdicts that are not shown.
     more: usize,
     /// Of the worst.
@@ -70,7 +72,6 @@ struct Row {
     margin: String,
     detectable: String,
     reason: String,
-    place: Option<String>,
 }
 
 impl Attention {
@@ -162,6 +163,7 @@ fn section(record: &Record, gallery: &Gallery, verdicts: &[&Verdict]) -> Result<
         gate: worst.gate.clone(),
         metric: worst.title(),
         verdicts: verdicts.iter().take(VERDICTS).map(|v| row(record, v)).collect(),
+        places: places(&verdicts[..verdicts.len().min(VERDICTS)]),
         more: verdicts.len().saturating_sub(VERDICTS),
         subject: worst.subject(),
         words: words::explain(worst, family).into_iter().filter(|text| !text.starts_with("See ")).collect(),
@@ -170,6 +172,16 @@ fn section(record: &Record, gallery: &Gallery, verdicts: &[&Verdict]) -> Result<
         profile,
         images,
     }))
+}
+
+fn places(verdicts: &[&Verdict]) -> Vec<String> {
+    let mut places: Vec<String> = Vec::new();
+    for place in verdicts.iter().filter_map(|v| v.place.as_ref()) {
+        if !places.contains(place) {
+            places.push(place.clone());
+        }
+    }
+    places
 }
 
 fn shows_in_profile(name: MetricName) -> bool {
@@ -191,6 +203,5 @@ fn row(record: &Record, v: &Verdict) -> Row {
         margin: margin_text(v),
         detectable: detectable_text(v.detectable),
         reason: v.reason.clone(),
-        place: v.place.clone(),
     }
 }

@@ -26,7 +26,11 @@ use crate::{
 };
 use attention::Attention;
 use grid::{Picture, Plot};
-use minijinja::{Environment, UndefinedBehavior, syntax::SyntaxConfig, value::Serde};
+use minijinja::{
+    AutoEscape, Environment, UndefinedBehavior,
+    syntax::SyntaxConfig,
+    value::{Serde, Value},
+};
 use overview::SceneRow;
 use scene::SceneSection;
 use serde::Serialize;
@@ -205,6 +209,8 @@ impl SignedRow {
 fn environment() -> Result<Environment<'static>, minijinja::Error> {
     let mut environment = Environment::new();
     environment.set_syntax(SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build()?);
+    // What macros return is then Markdown, not a text to be escaped again.
+    environment.set_auto_escape_callback(|_| AutoEscape::Custom("markdown".into()));
     environment.set_undefined_behavior(UndefinedBehavior::SemiStrict);
     environment.set_formatter(|out, _, value| {
         if value.is_none() {
@@ -217,6 +223,13 @@ fn environment() -> Result<Environment<'static>, minijinja::Error> {
             out.write_str(&escape::markdown(&text))?
         }
         Ok(())
+    });
+    // A value and its interval on one line, or the one over the other. Numbers keep their
+    // brackets: they are no links.
+    let number = |value: &str| escape::markdown(value).replace("&#91;", "[").replace("&#93;", "]");
+    environment.add_filter("line", move |value: String| Value::from_safe_string(number(&value).replace(' ', "\u{a0}")));
+    environment.add_filter("interval", move |value: String| {
+        Value::from_safe_string(number(&value).replace(", ", ",\u{a0}").replace(" [", "<br>["))
     });
     environment.add_template("attention", include_str!("attention.md.j2"))?;
     environment.add_template("scene", include_str!("scene.md.j2"))?;
@@ -241,6 +254,12 @@ pub(super) fn text(record: &Record, gallery: &Gallery) -> Result<String, ReportE
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        gate::Verdict,
+        pooled::Pooled,
+        record::{CaseRecord, SceneRecord},
+        suite::Case,
+    };
 
     /// All that a template prints is escaped, unless it says that it is Markdown.
     #[test]
@@ -263,5 +282,65 @@ mod tests {
         record.cases[1].error = Some("lost".into());
         record.cases[1].replicates = None;
         assert!(replicates(&record).starts_with("16 replicates"), "{}", replicates(&record));
+    }
+
+    /// GitHub renders half a megabyte: 50 scenes of 10 estimators, on two renderers with
+    /// two ray counts, must fit, and what is cut must be said.
+    #[test]
+    fn a_page_of_many_scenes_is_cut_and_says_so() {
+        let mut record: Record = serde_json::from_str(include_str!("../../../tests/records/v4/record.json")).unwrap();
+        let (scene, cases) = (record.scenes[0].clone(), record.cases.clone());
+        let (verdicts, pooled) = (record.verdicts.clone(), record.pooled.clone());
+        let names: Vec<String> = (0..10).map(|i| format!("estimator-number-{i}")).collect();
+        let scenes: Vec<String> = (0..50).map(|i| format!("curtain-of-place-{i}")).collect();
+        record.suite.estimators.clone_from(&names);
+        (record.scenes, record.cases, record.verdicts, record.pooled) = (vec![], vec![], vec![], vec![]);
+        let keys: Vec<(&String, &str, u32)> = names
+            .iter()
+            .flat_map(|n| [("cpu", 4), ("cpu", 32), ("gpu", 4), ("gpu", 32)].map(|(r, k)| (n, r, k)))
+            .collect();
+        for name in &scenes {
+            record.scenes.push(SceneRecord { name: name.clone(), ..scene.clone() });
+            for (estimator, renderer, rays) in &keys {
+                let case = Case {
+                    scene: name.clone(),
+                    estimator: (*estimator).clone(),
+                    renderer: (*renderer).to_owned(),
+                    rays: *rays,
+                };
+                record.cases.push(CaseRecord { case: case.clone(), ..cases[0].clone() });
+                record.verdicts.push(Verdict { scene: name.clone(), case: Some(case), ..verdicts[1].clone() });
+            }
+        }
+        for (estimator, renderer, rays) in &keys {
+            let key = Pooled {
+                estimator: (*estimator).clone(),
+                renderer: (*renderer).to_owned(),
+                rays: *rays,
+                ..pooled[0].clone()
+            };
+            record.pooled.push(key);
+        }
+        let mut gallery = Gallery::new("pictures".into(), false);
+        for name in &scenes {
+            for folder in [pictures::LOOK, pictures::MEASURE, pictures::MINUS_Q, pictures::MINUS_CONVERGED] {
+                for estimator in &names {
+                    gallery.place(&pictures::of_estimator(name, folder, estimator));
+                }
+            }
+            gallery.place(&pictures::profile(name));
+        }
+        let page = text(&record, &gallery).unwrap();
+        assert!(page.len() < MAX_BYTES, "{}", page.len());
+        assert!(
+            page.contains("This page is cut") && page.contains("1600 more are in") && page.contains("30 more cases")
+        );
+        for name in &scenes {
+            assert_eq!(page.matches(&format!("\n### {name}\n")).count(), 1);
+            assert!(page.contains(&format!("<details><summary>Pictures, profile and numbers of {name}</summary>")));
+        }
+        assert_eq!(page.matches("<details>").count(), page.matches("</details>").count());
+        record.scenes.truncate(1);
+        assert!(!text(&record, &gallery).unwrap().contains("This page is cut"));
     }
 }

@@ -83,7 +83,8 @@ pub fn contrast_error(record: &Record) -> Result<String, String> {
     }
     sheet.line([left, top + height], [WIDTH - 20.0, top + height], Stroke::new(INK, 1.2));
     let middle = left + frame.place[2] / 2.0;
-    let words = "← highlight lost, or too dark      contrast error dK = K − K(Q)      false highlight →";
+    let words =
+        "← highlight lost, or too dark\u{2003}\u{2003}contrast error dK = K − K(Q)\u{2003}\u{2003}false highlight →";
     sheet.text([middle, top + height + 40.0], words, 14.0, Anchor::Middle, INK);
     Ok(sheet.finish())
 }

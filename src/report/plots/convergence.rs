@@ -43,7 +43,8 @@ pub fn convergence(estimators: &[String], scene: &SceneRecord) -> Result<String,
             entries.push((Sign::Marker(Style::of(estimators, &c.estimator), Fill::Full), c.estimator.clone()));
         }
     }
-    entries.extend(renderers(all.iter().map(|c| c.renderer.as_str())));
+    let renderers = renderers(all.iter().map(|c| c.renderer.as_str()));
+    entries.extend(renderers.into_iter().map(|(sign, _, text)| (sign, text)));
     entries.push((Sign::Line { colour: GUIDE, dash: "7 5" }, "slope −1/2: independent rays".to_owned()));
     let legend = Legend::new(entries);
     let top = legend.bottom() + 20.0;

@@ -4,7 +4,7 @@ use super::{
     frame::{Axis, Frame, is_drawn, is_drawn_log},
     legend::{Legend, Sign},
     renderers,
-    sheet::{Anchor, INK, Sheet, Stroke, WIDTH, name},
+    sheet::{Anchor, INK, Sheet, Stroke, WIDTH, name, width_of},
     style::{Fill, Style},
 };
 use crate::{
@@ -30,12 +30,19 @@ const QUALITIES: [Quality; 2] = [
         of: |p| &p.contrast_error_size,
         is_log: false,
     },
-    Quality { heading: "against its own limit", label: "RMSE under occluders", of: |p| &p.rmse, is_log: true },
+    Quality {
+        heading: "against its own converged image",
+        label: "RMSE under occluders",
+        of: |p| &p.rmse,
+        is_log: true,
+    },
 ];
 
 struct Point<'a> {
     row: &'a Pooled,
     milliseconds: f64,
+    /// How many are in it.
+    scenes: usize,
     value: f64,
     interval: [f64; 2],
 }
@@ -58,7 +65,13 @@ pub fn cost(record: &Record) -> Result<String, String> {
             entries.push((Sign::Marker(Style::nth(i), Fill::Full), estimator.clone()));
         }
     }
-    entries.extend(renderers(all().map(|p| p.row.renderer.as_str())));
+    entries.extend(renderers(all().map(|p| p.row.renderer.as_str())).into_iter().map(|(sign, renderer, text)| {
+        // Over other scenes means do not compare: it is said how many they are.
+        let scenes = || all().filter(|p| p.row.renderer == renderer).map(|p| p.scenes);
+        let (least, most) = (scenes().min().unwrap_or(0), scenes().max().unwrap_or(0));
+        let count = if least == most { most.to_string() } else { format!("{least} to {most}") };
+        (sign, format!("{text}, {count} scene{}", if most == 1 { "" } else { "s" }))
+    }));
     let legend = Legend::new(entries);
     let top = legend.bottom() + 20.0;
     let mut sheet =
@@ -122,6 +135,7 @@ fn draw(sheet: &mut Sheet, frame: &Frame, estimators: &[String], points: &[Point
             keys.push(key);
         }
     }
+    let mut tags = Vec::new();
     for (estimator, renderer) in keys {
         let own = |p: &&Point<'_>| p.row.estimator == estimator && p.row.renderer == renderer;
         let mut own: Vec<&Point<'_>> = points.iter().filter(own).collect();
@@ -138,7 +152,30 @@ fn draw(sheet: &mut Sheet, frame: &Frame, estimators: &[String], points: &[Point
             let [lo, hi] = p.interval;
             let tip = format!("{who}: {:.3} ms, {:.3e} ({lo:.2e} to {hi:.2e})", p.milliseconds, p.value);
             sheet.marker([x, y], style, fill, &tip);
-            sheet.text([x + 7.0, y - 5.0], &p.row.rays.to_string(), 11.0, Anchor::Start, INK);
+            tags.push((p.row.rays, [x, y]));
+        }
+    }
+    tag(sheet, &tags);
+}
+
+/// Writes ray counts beside their points, where they cover neither another count nor
+/// another point; where there is no room, a pointer shows them.
+fn tag(sheet: &mut Sheet, tags: &[(u32, [f64; 2])]) {
+    const SIZE: f64 = 11.0;
+    let mut taken: Vec<[f64; 4]> = tags.iter().map(|(_, [x, y])| [x - 5.0, y - 5.0, x + 5.0, y + 5.0]).collect();
+    for (i, (rays, [x, y])) in tags.iter().enumerate() {
+        let text = rays.to_string();
+        let width = width_of(&text, SIZE);
+        let starts = [[x + 7.0, y - 5.0], [x + 7.0, y + 13.0], [x - 7.0 - width, y - 5.0], [x - 7.0 - width, y + 13.0]];
+        let room = starts.into_iter().find(|[left, bottom]| {
+            let own = [*left, bottom - 9.0, left + width, *bottom];
+            let meets =
+                |other: &[f64; 4]| own[0] < other[2] && other[0] < own[2] && own[1] < other[3] && other[1] < own[3];
+            !taken.iter().enumerate().any(|(j, other)| j != i && meets(other))
+        });
+        if let Some([left, bottom]) = room {
+            taken.push([left, bottom - 9.0, left + width, bottom]);
+            sheet.text([left, bottom], &text, SIZE, Anchor::Start, INK);
         }
     }
 }

@@ -26,8 +26,8 @@ use legend::Sign;
 use sheet::GUIDE;
 use style::{Fill, Shape, Style};
 
-/// Entries of a legend that tell the renderers apart, each once.
-fn renderers<'a>(names: impl Iterator<Item = &'a str>) -> Vec<(Sign, String)> {
+/// Entries of a legend that tell the renderers apart, each once: sign, name, and text.
+fn renderers<'a>(names: impl Iterator<Item = &'a str>) -> Vec<(Sign, &'a str, String)> {
     let mut found: Vec<&str> = Vec::new();
     for name in names {
         if !found.contains(&name) {
@@ -40,7 +40,7 @@ fn renderers<'a>(names: impl Iterator<Item = &'a str>) -> Vec<(Sign, String)> {
         "gpu" => "GPU".to_owned(),
         other => other.to_owned(),
     };
-    found.into_iter().map(|name| (Sign::Marker(style, Fill::of_renderer(name)), text(name))).collect()
+    found.into_iter().map(|name| (Sign::Marker(style, Fill::of_renderer(name)), name, text(name))).collect()
 }
 
 /// The case of an estimator that shows best what it is: on the CPU, where it ran there,

@@ -5,10 +5,7 @@ use super::style::{Fill, Style};
 use crate::escape;
 use svg::{
     Document, Node,
-    node::{
-        Text as Content,
-        element::{Circle, Line, Polygon, Polyline, Rectangle, Text, Title},
-    },
+    node::element::{Circle, Line, Polygon, Polyline, Rectangle, Text, Title},
 };
 
 /// Width of every plot: that of GitHub's column of text.
@@ -187,6 +184,5 @@ fn written(text: &str, size: f64, anchor: Anchor, colour: &str) -> Text {
         Anchor::Middle => "middle",
         Anchor::End => "end",
     };
-    let node = Text::new("").set("font-size", size).set("text-anchor", anchor).set("fill", colour);
-    node.add(Content::new(escape::line(text)))
+    Text::new(escape::line(text)).set("font-size", size).set("text-anchor", anchor).set("fill", colour)
 }
