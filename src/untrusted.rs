@@ -2,7 +2,7 @@
 //! and records come from anybody, and what is made of them must read as text, whatever
 //! it holds.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, fmt::Write as _};
 
 /// On one line, without what is not seen: control characters become spaces; marks that
 /// turn the direction of text, by which a name reads as another, are left out, and so are
@@ -13,7 +13,7 @@ pub(crate) fn line(text: &str) -> String {
 
 fn shown(c: char) -> Option<char> {
     match c {
-        '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => None,
+        '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => None,
         '\u{fdd0}'..='\u{fdef}' => None,
         c if u32::from(c) & 0xfffe == 0xfffe => None,
         '\u{2028}' | '\u{2029}' => Some(' '),
@@ -40,42 +40,57 @@ pub(crate) fn cut(text: &str, characters: usize) -> Cow<'_, str> {
     }
 }
 
-/// Markdown that reads as the text: no markup, no HTML, no end of a table's cell, no
-/// mention of a person and no link. Not for code spans, which show it as it is.
+/// Text as it reads in Markdown (GitHub's), in any place: a heading, a cell, a list, the
+/// text of a link or of an image, or within `<code>`. No markup, no HTML, no end of a
+/// cell, no mention of a person and no link comes of it. Not for use within backticks,
+/// where entities are not read.
 pub(crate) fn markdown(text: &str) -> String {
-    escaped(text, |c, _| "&<>|`*_[]\\~$!@#:".contains(c))
-}
-
-/// The same for a file that people also read as it is: what does no harm by itself is
-/// left. Names of scenes and estimators stay as they are, so that this may be put into
-/// code spans and paths, too.
-pub(crate) fn markdown_source(text: &str) -> String {
-    escaped(text, |c, next| match c {
-        // Only what follows makes it a link, a footnote or the place that one leads to.
-        '[' => next == Some('^'),
-        ']' => next.is_some_and(|n| "([:".contains(n)),
-        '!' => next == Some('['),
-        ':' => true,
-        _ => "&<>|`*\\~$@#".contains(c),
-    })
-}
-
-fn escaped(text: &str, is_special: impl Fn(char, Option<char>) -> bool) -> String {
-    let text = line(text);
-    let mut safe = String::with_capacity(text.len());
-    let mut rest = text.chars().peekable();
-    while let Some(c) = rest.next() {
-        let next = rest.peek().copied();
+    let line = line(text);
+    let line = line.trim();
+    let mut safe = String::new();
+    let mut rest = line;
+    // What begins a list, a rule, or underlines a heading.
+    let mark = rest.starts_with(['-', '+', '=']) && !rest[1..].starts_with(|c: char| c.is_ascii_digit() || c == '.');
+    if mark {
+        let _ = write!(safe, "&#{};", u32::from(rest.as_bytes()[0]));
+        rest = &rest[1..];
+    }
+    let digits = rest.bytes().take_while(u8::is_ascii_digit).count();
+    if digits > 0 && rest[digits..].starts_with(['.', ')']) && !rest[digits + 1..].starts_with(|c: char| c != ' ') {
+        let _ = write!(safe, "{}&#{};", &rest[..digits], u32::from(rest.as_bytes()[digits]));
+        rest = &rest[digits + 1..];
+    }
+    for (i, c) in rest.char_indices() {
         match c {
-            c if !is_special(c, next) => safe.push(c),
             '&' => safe += "&amp;",
             '<' => safe += "&lt;",
             '>' => safe += "&gt;",
-            // A space without width keeps what follows from becoming a link.
-            '@' | '#' => safe += &format!("&#{};\u{200b}", u32::from(c)),
-            ':' if next == Some('/') => safe += ":\u{200b}",
-            ':' => safe.push(c),
-            c => safe += &format!("&#{};", u32::from(c)),
+            '"' => safe += "&quot;",
+            '|' | '`' | '*' | '_' | '[' | ']' | '\\' | '~' | '$' | '!' => {
+                let _ = write!(safe, "&#{};", u32::from(c));
+            }
+            // A space without width keeps what follows from becoming a mention or a link.
+            '@' | '#' => {
+                let _ = write!(safe, "&#{};\u{200b}", u32::from(c));
+            }
+            ':' if rest[i + 1..].starts_with('/') => safe += ":\u{200b}",
+            // GitHub links what begins so without a scheme.
+            '.' if rest.as_bytes()[i.saturating_sub(3)..i].eq_ignore_ascii_case(b"www") => safe += "\u{200b}.",
+            c => safe.push(c),
+        }
+    }
+    safe
+}
+
+/// A path relative to the page, for the target of a link: all but letters, digits and
+/// `-._~/` as `%XX`.
+pub(crate) fn path(path: &str) -> String {
+    let mut safe = String::new();
+    for byte in path.bytes() {
+        if byte.is_ascii_alphanumeric() || b"-._~/".contains(&byte) {
+            safe.push(char::from(byte));
+        } else {
+            let _ = write!(safe, "%{byte:02X}");
         }
     }
     safe
@@ -116,26 +131,25 @@ mod tests {
             ("a|b\nc", "a&#124;b c"),
             ("<img src=x>&amp;", "&lt;img src=x&gt;&amp;amp;"),
             ("[x](http://y)", "&#91;x&#93;(http:\u{200b}//y)"),
+            ("www.y.z", "www\u{200b}.y.z"),
             ("**_`~\\", "&#42;&#42;&#95;&#96;&#126;&#92;"),
             ("@me #1", "&#64;\u{200b}me &#35;\u{200b}1"),
-            ("a\u{202e}b\u{7}", "ab "),
+            ("- item", "&#45; item"),
+            ("---", "&#45;--"),
+            ("   code", "code"),
+            ("1. item", "1&#46; item"),
+            ("12)", "12&#41;"),
+            ("-0.25 ± 0.01", "-0.25 ± 0.01"),
+            ("1.5", "1.5"),
+            ("é-ü", "é-ü"),
         ] {
             assert_eq!(markdown(text), expected, "{text}");
         }
     }
 
     #[test]
-    fn a_source_stays_legible() {
-        for text in ["0.27 [0.26, 0.28]", "a_scene.v2-x/classic_1/cpu/4", "K(Q) is 0: yes!", "0.1\u{a0}±\u{a0}0.2"] {
-            assert_eq!(markdown_source(text), text);
-        }
-        for (text, expected) in [
-            ("a|b\n`c`", "a&#124;b &#96;c&#96;"),
-            ("![x](http://y)", "&#33;[x&#93;(http:\u{200b}//y)"),
-            ("[x]: /y [^1]", "[x&#93;: /y &#91;^1]"),
-            ("<b>~~~", "&lt;b&gt;&#126;&#126;&#126;"),
-        ] {
-            assert_eq!(markdown_source(text), expected, "{text}");
-        }
+    fn paths_keep_their_folders() {
+        assert_eq!(path("pictures/curtain-arcade/q.png"), "pictures/curtain-arcade/q.png");
+        assert_eq!(path("ä\\\"<>'#?%"), "%C3%A4%5C%22%3C%3E%27%23%3F%25");
     }
 }

@@ -37,6 +37,10 @@ pub struct Args {
     /// pictures of what did not pass, which it can by no other way.
     #[arg(long, value_name = "URL")]
     image_base: Option<ImageBase>,
+    /// Put the pictures into report.md as data URIs, so that it is one file. GitHub does
+    /// not show such pictures.
+    #[arg(long)]
+    embed_images: bool,
     /// Exit as the run did.
     #[arg(long)]
     gate: bool,
@@ -68,7 +72,7 @@ impl Beside {
     /// Makes them beside the record. Returns the files.
     pub(super) fn make(&self, record: &Record, folder: &Path, printed: Printed) -> Result<Vec<PathBuf>, Failure> {
         let images = self.image_base.as_ref();
-        Wanted { formats: &self.report, images, folder, out: folder, printed }.make(record)
+        Wanted { formats: &self.report, images, folder, out: folder, embed: false, printed }.make(record)
     }
 }
 
@@ -76,7 +80,13 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     check(&args.format, args.image_base.as_ref(), "--format")?;
     let record = Record::read(&args.record)?;
     let (formats, images, folder) = (&args.format[..], args.image_base.as_ref(), args.record.as_path());
-    let wanted = Wanted { formats, images, folder, out: args.out.as_deref().unwrap_or(folder), printed: Printed::Text };
+    let (out, embed) = (args.out.as_deref().unwrap_or(folder), args.embed_images);
+    if embed && !formats.contains(&Format::Markdown) {
+        return Err(Failure::usage(
+            "--embed-images is of use with --format markdown only: HTML always holds its images",
+        ));
+    }
+    let wanted = Wanted { formats, images, folder, out, embed, printed: Printed::Text };
     let files = wanted.make(&record)?;
     tell(&told(&files, &record.summary_line()));
     Ok(if args.gate { Exit::of(&record) } else { Exit::Pass })
@@ -102,6 +112,8 @@ struct Wanted<'a> {
     /// The record's.
     folder: &'a Path,
     out: &'a Path,
+    /// Whether the Markdown holds its pictures.
+    embed: bool,
     /// Whether something else is printed for programs.
     printed: Printed,
 }
@@ -112,7 +124,7 @@ impl Wanted<'_> {
         let mut files = Vec::new();
         let wants = |format| self.formats.contains(&format);
         if wants(Format::Markdown) {
-            report::write_markdown(record, self.folder, self.out)?;
+            report::write_markdown(record, self.folder, self.out, self.embed)?;
             files.push(self.out.join(report::FILE));
         }
         if wants(Format::Html) {

@@ -2,6 +2,8 @@
 
 /// The folder of all pictures.
 pub const PICTURES: &str = "pictures";
+/// Within a scene's pictures, those of the look view.
+pub const LOOK: &str = "look";
 /// Within a scene's pictures, those of the measure view.
 pub const MEASURE: &str = "measure";
 /// Maps of O - Q within a scene's pictures, and the name of their bar.
@@ -22,4 +24,34 @@ pub fn q(scene: &str) -> String {
 /// The profiles along the transect.
 pub fn profile(scene: &str) -> String {
     format!("{PICTURES}/{scene}/profile.svg")
+}
+
+/// The path-traced picture of the look view.
+pub fn path_traced(scene: &str) -> String {
+    format!("{PICTURES}/{scene}/path-traced.png")
+}
+
+/// The error over rays.
+pub fn convergence(scene: &str) -> String {
+    format!("{PICTURES}/{scene}/convergence.svg")
+}
+
+/// The bar of the scale of maps: [`MINUS_Q`] or [`MINUS_CONVERGED`].
+pub fn bar(maps: &str) -> String {
+    format!("{PICTURES}/{maps}.png")
+}
+
+/// The contrast error of all methods in all scenes.
+pub fn contrast_error() -> String {
+    format!("{PICTURES}/contrast-error.svg")
+}
+
+/// Time against error.
+pub fn cost() -> String {
+    format!("{PICTURES}/cost.svg")
+}
+
+/// The p-values of the verdicts.
+pub fn p_values() -> String {
+    format!("{PICTURES}/p-values.svg")
 }

@@ -15,7 +15,7 @@ pub(super) struct ConvergenceRow {
     renderer: String,
     region: &'static str,
     /// RMSE by ray count.
-    rmse: String,
+    rmse: Vec<String>,
     /// b² at the most rays.
     bias_squared: String,
     variance: String,
@@ -51,7 +51,7 @@ fn row(record: &Record, scene: &SceneRecord, c: &Convergence) -> ConvergenceRow 
         estimator: c.estimator.clone(),
         renderer: c.renderer.clone(),
         region: c.region.label(),
-        rmse: rmse.collect::<Vec<_>>().join("<br>"),
+        rmse: rmse.collect(),
         bias_squared: last.map_or_else(String::new, |p| show(&p.bias_squared)),
         variance: last.map_or_else(String::new, |p| show(&p.variance)),
         slope: show(&c.slope),
@@ -112,7 +112,7 @@ fn seconds(record: &Record, scene: &SceneRecord, c: &Convergence, rays: u32) -> 
         let case = &r.case;
         case.scene == scene.name && case.estimator == c.estimator && case.renderer == c.renderer && case.rays == rays
     })?;
-    Some(record.timing.cases.get(&found.case.id())? / f64::from(record.replicates(found)))
+    Some(record.timing.cases.get(&found.case.id())? / f64::from(record.replicates(found).max(1)))
 }
 
 /// `value ± half width`, or a dash. Small numbers keep two digits that count.

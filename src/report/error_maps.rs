@@ -2,7 +2,7 @@
 //! against its own converged image. Each kind has one scale in all scenes, so that its
 //! bar is drawn once.
 
-use super::{ReportError, middle};
+use super::{ReportError, gallery::Gallery, middle};
 use crate::{
     layers::{Layers, write_png},
     picture::{
@@ -10,11 +10,12 @@ use crate::{
         error_map::{ErrorMap, MapError},
         scale::Scale,
     },
-    record::{CaseRecord, Record, SceneRecord},
+    record::{
+        CaseRecord, Record, SceneRecord,
+        pictures::{MINUS_CONVERGED, MINUS_Q, bar},
+    },
 };
 use std::path::Path;
-
-pub use crate::record::pictures::{MINUS_CONVERGED, MINUS_Q};
 
 /// How far the scale of O - Q reaches to both sides of 0.
 pub const LIMIT_Q: f64 = 0.5;
@@ -28,13 +29,13 @@ const BAR_WIDTH: u32 = 416;
 const FACTOR: u32 = 4;
 
 /// Draws the two bars, where any scene has a judge.
-pub fn bars(record: &Record, out: &Path) -> Result<(), ReportError> {
+pub fn bars(record: &Record, gallery: &mut Gallery) -> Result<(), ReportError> {
     if record.scenes.iter().all(|s| s.judge.is_none()) {
         return Ok(());
     }
     for (name, limit) in [(MINUS_Q, LIMIT_Q), (MINUS_CONVERGED, LIMIT_CONVERGED)] {
         let scale = Scale::signed(limit).map_err(|source| ReportError::Map { image: name.to_owned(), source })?;
-        write_png(&out.join(format!("{name}.png")), &color_bar(&scale, "openness", BAR_WIDTH))?;
+        write_png(&gallery.place(&bar(name)), &color_bar(&scale, "openness", BAR_WIDTH))?;
     }
     Ok(())
 }

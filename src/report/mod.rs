@@ -7,13 +7,14 @@ mod definitions;
 pub mod digest;
 mod error_maps;
 pub mod flatland;
+mod gallery;
 pub mod github;
 pub mod html;
 pub mod junit;
 mod markdown;
 mod occluders;
 pub(crate) mod picture;
-mod plot;
+pub mod plots;
 mod pooled;
 pub mod table;
 
@@ -23,9 +24,13 @@ use crate::{
     layers::Layers,
     metrics::judge::too_noisy,
     picture::error_map::MapError,
-    record::{Record, SceneRecord, pictures::MEASURE},
+    record::{
+        Record, SceneRecord,
+        pictures::{self, LOOK, MEASURE, MINUS_CONVERGED, MINUS_Q},
+    },
     untrusted,
 };
+use gallery::Gallery;
 use std::{collections::BTreeMap, io::Write, path::Path};
 
 /// The name of the report in its folder.
@@ -78,14 +83,6 @@ pub enum ReportError {
         /// Why.
         source: MapError,
     },
-    /// A plot could not be drawn.
-    #[error("the plot of scene '{scene}' cannot be drawn: {message}")]
-    Plot {
-        /// The scene.
-        scene: String,
-        /// Why.
-        message: String,
-    },
     /// The built-in template failed.
     #[error("the report template failed: {0}")]
     Template(#[from] minijinja::Error),
@@ -101,21 +98,32 @@ pub enum ReportError {
 /// Where the record or an image cannot be read, or the report not written.
 pub fn write(record_folder: &Path, out: &Path) -> Result<Record, ReportError> {
     let record = Record::read(record_folder)?;
-    write_markdown(&record, record_folder, out)?;
+    write_markdown(&record, record_folder, out, false)?;
     Ok(record)
 }
 
 /// Makes `report.md` and its pictures from a record that was read from `record_folder`,
-/// into `out`.
+/// into `out`. `embed` puts the pictures into the page, as data URIs, with no file beside
+/// it; GitHub does not show such pictures.
 ///
 /// # Errors
 /// Where an image cannot be read, or the report not written.
-pub fn write_markdown(record: &Record, record_folder: &Path, out: &Path) -> Result<(), ReportError> {
+pub fn write_markdown(record: &Record, record_folder: &Path, out: &Path, embed: bool) -> Result<(), ReportError> {
+    let aside = if embed {
+        Some(tempfile::tempdir().map_err(DiskError::io(&std::env::temp_dir(), "make a folder"))?)
+    } else {
+        None
+    };
+    let folder = aside.as_ref().map_or(out, |aside| aside.path());
+    let mut gallery = Gallery::new(folder.to_owned(), embed);
     for scene in &record.scenes {
-        pictures(record_folder, record, scene, &out.join(markdown::PICTURES).join(&scene.name))?;
+        draw_scene(record_folder, record, scene, &mut gallery)?;
     }
-    error_maps::bars(record, &out.join(markdown::PICTURES))?;
-    let text = markdown::text(record)?;
+    error_maps::bars(record, &mut gallery)?;
+    gallery.plot(&pictures::contrast_error(), plots::contrast_error(record))?;
+    gallery.plot(&pictures::cost(), plots::cost(record))?;
+    gallery.plot(&pictures::p_values(), plots::p_values(record))?;
+    let text = markdown::text(record, &gallery)?;
     write_whole(&out.join(FILE), |buffer| buffer.write_all(text.as_bytes()))?;
     Ok(())
 }
@@ -140,15 +148,17 @@ fn layer(layers: &Layers, image: &str, name: &str) -> Result<Vec<f32>, ReportErr
     layers.get(name).map(<[f32]>::to_vec).ok_or_else(missing)
 }
 
-fn pictures(folder: &Path, record: &Record, scene: &SceneRecord, out: &Path) -> Result<(), ReportError> {
+/// The pictures and plots of one scene.
+fn draw_scene(folder: &Path, record: &Record, scene: &SceneRecord, gallery: &mut Gallery) -> Result<(), ReportError> {
     let read = |image: &str| Layers::read(&folder.join(image));
     let look = read(&scene.look)?;
     for name in &record.suite.estimators {
         let values = layer(&look, &scene.look, &format!("openness-{name}"))?;
-        picture::openness(&values, look.resolution, 1, &out.join("look").join(format!("{name}.png")))?;
+        let place = gallery.place(&pictures::of_estimator(&scene.name, LOOK, name));
+        picture::openness(&values, look.resolution, 1, &place)?;
     }
     let traced = layer(&look, &scene.look, "path-traced")?;
-    picture::irradiance(&traced, look.resolution, &out.join("path-traced.png"))?;
+    picture::irradiance(&traced, look.resolution, &gallery.place(&pictures::path_traced(&scene.name)))?;
 
     let converged = read(&scene.image)?;
     let mut shown = BTreeMap::new();
@@ -158,34 +168,49 @@ fn pictures(folder: &Path, record: &Record, scene: &SceneRecord, out: &Path) -> 
             None => layer(&converged, &scene.image, &format!("converged-{name}"))?,
         };
         let (middle, size) = middle(scene, &values);
-        picture::openness(&middle, size, 4, &out.join(MEASURE).join(format!("{name}.png")))?;
+        let place = gallery.place(&pictures::of_estimator(&scene.name, MEASURE, name));
+        picture::openness(&middle, size, 4, &place)?;
         shown.insert(name.as_str(), values);
     }
-    if let Some(judge) = &scene.judge {
-        let layers = read(&judge.image)?;
-        let mut q = layer(&layers, &judge.image, "q")?;
-        let se = layer(&layers, &judge.image, "q-relative-se")?;
-        for (q, se) in q.iter_mut().zip(se) {
-            if too_noisy(se) {
-                *q = f32::NAN;
-            }
-        }
-        for (name, test) in &shown {
-            let pair = error_maps::Pair { test, reference: &q, image: &judge.image };
-            let path = out.join(error_maps::MINUS_Q).join(format!("{name}.png"));
-            error_maps::write(scene, &pair, error_maps::LIMIT_Q, &path)?;
-            let Some(case) = error_maps::fewest(record, scene, name) else { continue };
-            let reference = &layer(&converged, &scene.image, &format!("converged-{name}"))?;
-            let pair = error_maps::Pair { test: &error_maps::mean(folder, case)?, reference, image: &scene.image };
-            let path = out.join(error_maps::MINUS_CONVERGED).join(format!("{name}.png"));
-            error_maps::write(scene, &pair, error_maps::LIMIT_CONVERGED, &path)?;
-        }
-        let (q, size) = middle(scene, &q);
-        picture::openness(&q, size, 4, &out.join("q.png"))?;
+    if scene.judge.is_some() {
+        against_judge(folder, record, scene, (&converged, &shown), gallery)?;
     }
-    let svg = plot::profile(scene).map_err(|message| ReportError::Plot { scene: scene.name.clone(), message })?;
-    write_whole(&out.join("profile.svg"), |buffer| buffer.write_all(svg.as_bytes()))?;
+    let ranges = plots::Ranges::new(scene, &converged);
+    let estimators = &record.suite.estimators;
+    gallery.plot(&pictures::profile(&scene.name), plots::profile(estimators, scene, &ranges))?;
+    gallery.plot(&pictures::convergence(&scene.name), plots::convergence(estimators, scene))?;
     Ok(())
+}
+
+/// Q, and each method less Q and less its converged image.
+fn against_judge(
+    folder: &Path,
+    record: &Record,
+    scene: &SceneRecord,
+    (converged, shown): (&Layers, &BTreeMap<&str, Vec<f32>>),
+    gallery: &mut Gallery,
+) -> Result<(), ReportError> {
+    let Some(judge) = &scene.judge else { return Ok(()) };
+    let layers = Layers::read(&folder.join(&judge.image))?;
+    let mut q = layer(&layers, &judge.image, "q")?;
+    let se = layer(&layers, &judge.image, "q-relative-se")?;
+    for (q, se) in q.iter_mut().zip(se) {
+        if too_noisy(se) {
+            *q = f32::NAN;
+        }
+    }
+    for (name, test) in shown {
+        let pair = error_maps::Pair { test, reference: &q, image: &judge.image };
+        let place = gallery.place(&pictures::of_estimator(&scene.name, MINUS_Q, name));
+        error_maps::write(scene, &pair, error_maps::LIMIT_Q, &place)?;
+        let Some(case) = error_maps::fewest(record, scene, name) else { continue };
+        let reference = &layer(converged, &scene.image, &format!("converged-{name}"))?;
+        let pair = error_maps::Pair { test: &error_maps::mean(folder, case)?, reference, image: &scene.image };
+        let place = gallery.place(&pictures::of_estimator(&scene.name, MINUS_CONVERGED, name));
+        error_maps::write(scene, &pair, error_maps::LIMIT_CONVERGED, &place)?;
+    }
+    let (q, size) = middle(scene, &q);
+    Ok(picture::openness(&q, size, 4, &gallery.place(&pictures::q(&scene.name)))?)
 }
 
 /// The image of a smoothed method, of the most rays, whose mean over replicates shows

@@ -83,7 +83,7 @@ fn scenes(pooled: &[Pooled]) -> Vec<String> {
         }
         let one = sets.len() == 1;
         for (text, methods) in sets {
-            let who = if one { String::new() } else { format!(" of `{}`", methods.join("`, `")) };
+            let who = if one { String::new() } else { format!(" of {}", methods.join(", ")) };
             lines.push(format!("{column}{who}: {text}"));
         }
     }

@@ -45,7 +45,7 @@ fn page(folder: &Path, record: &Record) -> Result<String, ReportError> {
             order.insert(place, rows::item(record, case, images.pairs(case, &mut planes)?));
         }
         items.extend(rows::judge(record, scene, images.of_judge(&mut planes)));
-        scenes.push(rows::scene(scene)?);
+        scenes.push(rows::scene(record, scene, images.converged()));
     }
     items.extend(order.into_values());
     items.sort_by_key(|item| rows::rank(item.outcome));
@@ -58,7 +58,7 @@ fn page(folder: &Path, record: &Record) -> Result<String, ReportError> {
         gates: rows::gates(record),
         items,
         scenes,
-        plots: Vec::new(),
+        plots: rows::plots(record),
         words: definitions::of(record),
         facts: rows::facts(record),
         review: None,

@@ -72,6 +72,11 @@ impl<'a> SceneImages<'a> {
         Ok(SceneImages { folder, record, scene, converged, look: read(&scene.look)?, q })
     }
 
+    /// Regions and converged images.
+    pub(crate) fn converged(&self) -> &Layers {
+        &self.converged
+    }
+
     /// The pairs of a case, that shown first being the first; none where it has no image.
     pub(crate) fn pairs(&self, case: &CaseRecord, planes: &mut Planes) -> Result<Vec<Pair>, ReportError> {
         let Some(own) = self.mean(case)? else { return Ok(Vec::new()) };

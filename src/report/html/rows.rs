@@ -1,11 +1,13 @@
 //! What a record says, as the page's rows.
 
 use super::super::{
-    ReportError, markdown, plot,
+    markdown::scene::judge_text,
+    plots::{self, Ranges},
     table::{self, detectable_text, value_text},
 };
 use crate::{
     gate::{CONFIDENCE, Outcome, Verdict},
+    layers::Layers,
     record::{CaseRecord, Record, SceneRecord},
     viewer::{GateRow, Item, Pair, Plot, SceneNote, VerdictRow},
 };
@@ -143,19 +145,51 @@ pub(super) fn gates(record: &Record) -> Vec<GateRow> {
     table::rows(record).into_iter().map(of).collect()
 }
 
-/// A scene with its profile.
-pub(super) fn scene(scene: &SceneRecord) -> Result<SceneNote, ReportError> {
+/// A plot, where there is something to draw.
+fn plot(title: &str, alt: String, svg: Result<String, String>) -> Option<Plot> {
+    Some(Plot { title: title.to_owned(), alt, svg: svg.ok()? })
+}
+
+/// A scene with its plots.
+pub(super) fn scene(record: &Record, scene: &SceneRecord, converged: &Layers) -> SceneNote {
     let mut lines = vec![scene.description.clone()];
-    lines.extend(markdown::judge_text(scene).map(|text| format!("Judge: {text}")));
+    lines.extend(judge_text(scene).map(|text| format!("Judge: {text}")));
     lines.extend(scene.no_judge.iter().map(|why| format!("No judge: {why}.")));
-    let svg = plot::profile(scene).map_err(|message| ReportError::Plot { scene: scene.name.clone(), message })?;
     let curves: Vec<&str> = scene.profiles.iter().map(|c| c.label.as_str()).collect();
-    let profile = Plot {
-        title: "Openness along the transect, with 95 % bands".into(),
-        alt: format!("Openness over the place along the transect, of {}", curves.join(", ")),
-        svg,
-    };
-    Ok(SceneNote { name: scene.name.clone(), lines, plots: vec![profile] })
+    let estimators = &record.suite.estimators;
+    let profile = plot(
+        "Openness along the transect",
+        format!("Openness over the place along the transect, with 95 % bands, of {}", curves.join(", ")),
+        plots::profile(estimators, scene, &Ranges::new(scene, converged)),
+    );
+    let convergence = plot(
+        "Convergence",
+        format!("RMSE of one replicate over its rays, both logarithmic, of {}", estimators.join(", ")),
+        plots::convergence(estimators, scene),
+    );
+    SceneNote { name: scene.name.clone(), lines, plots: profile.into_iter().chain(convergence).collect() }
+}
+
+/// Plots of the whole run.
+pub(super) fn plots(record: &Record) -> Vec<Plot> {
+    let all = [
+        plot(
+            "Contrast error",
+            "Contrast error dK of each estimator with its 95 % interval, a row a scene; 0 is right".into(),
+            plots::contrast_error(record),
+        ),
+        plot(
+            "Cost against error",
+            "Milliseconds of a replicate against mean |dK| and against RMSE, a point an estimator, renderer and ray count".into(),
+            plots::cost(record),
+        ),
+        plot(
+            "p-values of the verdicts",
+            "Histogram of the p-values of all verdicts".into(),
+            plots::p_values(record),
+        ),
+    ];
+    all.into_iter().flatten().collect()
 }
 
 /// Where the record comes from.
