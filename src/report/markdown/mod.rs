@@ -12,6 +12,7 @@ mod verdicts;
 
 use super::{
     ReportError,
+    definitions::{self, Definition},
     error_maps::{LIMIT_CONVERGED, LIMIT_Q},
     gallery::Gallery,
     pooled::{self, PooledRow},
@@ -67,6 +68,7 @@ struct Context<'a> {
     /// Where documentation lies, with a slash at its end; empty where that is not known.
     docs: String,
     judge_seconds: f64,
+    definitions: Vec<Definition>,
 }
 
 /// Plots of the whole run.
@@ -194,6 +196,7 @@ fn context<'a>(record: &'a Record, gallery: &Gallery, brief: bool) -> Result<Con
         smoothed,
         docs: docs(),
         judge_seconds: record.timing.judges.values().sum(),
+        definitions: definitions::of(record),
     })
 }
 
