@@ -23,7 +23,7 @@ const SUITE: &str = r#"
 description = "A suite with one gate that fails, one that passes, one that holds nothing."
 scenes = ["curtain-arcade", "plane"]
 rays = [2, 8]
-replicates = 4
+replicates = 8
 converged_rays = 32
 look_rays = 1
 judge = { precision = 0.2, paths = 2, replicates = 4 }
@@ -38,6 +38,7 @@ receiver_plane = "clipped"
 name = "No bias under the occluder"
 metric = "bias"
 region = "footprint"
+scenes = ["curtain-arcade"]
 equals = 0.0
 within = 0.5
 [[gate]]
@@ -283,7 +284,7 @@ fn what_failed_comes_first_with_its_numbers_and_its_picture() {
     );
     assert!(section.contains("Measured over footprint ("), "{section}");
     assert!(!section.contains("No bias") && text.contains("this run used no GPU"));
-    assert!(text.contains("over 4 replicates with seeds of their own"), "{text}");
+    assert!(text.contains("over 8 replicates with seeds of their own"), "{text}");
 }
 
 /// Nothing is promised that is not there, and nothing drawn that is not shown.

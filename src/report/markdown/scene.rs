@@ -142,7 +142,7 @@ impl SceneSection {
             screen: scene.screen.as_ref().map(|s| screen_text(scene, s)),
             look,
             measure,
-            noise,
+            noise: noise.filter(|_| !brief),
             profile: Plot::new(gallery, &format!("openness along the transect of {name}"), &pictures::profile(name))?,
             convergence_plot: Plot::new(gallery, &format!("error over rays in {name}"), &pictures::convergence(name))?,
             more_cases: whole.len() - listed.len(),
