@@ -133,7 +133,8 @@ fn target(tag: &Tag<'_>) -> String {
     }
 }
 
-/// Puts a text wherever a record holds one that is free.
+/// Puts a text wherever a record holds one that is free; names of scenes, estimators and
+/// renderers are not.
 fn rename(record: &mut Record, text: &str) {
     let some = || Some(text.to_owned());
     record.tool = text.into();
@@ -141,8 +142,6 @@ fn rename(record: &mut Record, text: &str) {
     record.incomplete = some();
     record.suite.name = text.into();
     record.suite.description = text.into();
-    record.suite.classic = text.into();
-    record.suite.methods = std::mem::take(&mut record.suite.methods).into_values().map(|m| (text.into(), m)).collect();
     record.machine =
         Machine { os: text.into(), arch: text.into(), cpu: text.into(), gpu: text.into(), gpu_is_software: Some(true) };
     record.timing.began = text.into();
@@ -156,7 +155,6 @@ fn rename(record: &mut Record, text: &str) {
         v.picture = v.picture.as_ref().map(|p| if p.ends_with(".png") { p.clone() } else { "x.exr".into() });
     }
     for p in &mut record.pooled {
-        p.estimator = text.into();
         p.contrast.left_out = vec![aogauge::pooled::LeftOut { scene: text.into(), why: text.into() }];
     }
     for s in &mut record.scenes {
@@ -250,7 +248,7 @@ fn pictures_that_were_not_drawn_are_not_shown() {
     let dir = tempfile::tempdir().unwrap();
     let record = changed(dir.path(), |r| {
         for v in &mut r.verdicts {
-            v.picture = Some("pictures/x](http:evil)<script>.png".into());
+            v.picture = Some("pictures/evil/none.png".into());
         }
     });
     let text = page(&record, &dir.path().join("out"));

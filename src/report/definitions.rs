@@ -64,7 +64,9 @@ pub(super) fn of(record: &Record) -> Vec<Definition> {
             "Removed",
             "metrics.md",
             "removed",
-            format!("is the share of {classic}'s false highlight that a method takes away. 0 leaves it, 1 takes it all."),
+            format!(
+                "is the share of {classic}'s false highlight that a method takes away. 0 leaves it, 1 takes it all."
+            ),
         ),
         define(
             "Bias",

@@ -59,7 +59,10 @@ fn page(folder: &Path, record: &Record) -> Result<String, ReportError> {
         items,
         scenes,
         plots: rows::plots(record),
-        words: definitions::of(record).into_iter().map(|d| [d.word.to_owned(), format!("{} {}", d.word, d.meaning)]).collect(),
+        words: definitions::of(record)
+            .into_iter()
+            .map(|d| [d.word.to_owned(), format!("{} {}", d.word, d.meaning)])
+            .collect(),
         facts: rows::facts(record),
         review: None,
     };
