@@ -178,6 +178,17 @@ def installs(archive):
     assert "Build the program" in run.ran
     yield "cargo install builds it from the action's folder"
 
+    # A program that is killed, by a signal or for its memory, has no verdict.
+    folder = WORK / "server/OWNER/aogauge/releases/download/v0.0.9"
+    (folder / f"aogauge-v0.0.9-{TARGET}").mkdir(parents=True)
+    program = folder / f"aogauge-v0.0.9-{TARGET}/aogauge"
+    program.write_text('#!/bin/sh\n[ "$1" = --version ] || kill -KILL $$\n')
+    program.chmod(0o755)
+    name = f"{program.parent.name}.tar.gz"
+    subprocess.run(f"tar -czf {name} {program.parent.name} && sha256sum {name} > SHA256SUMS", cwd=folder, shell=True, check=True)
+    Run("killed", base | {"version": "0.0.9"}).expect(1, "", "aogauge ended with 137")
+    yield "a program that is killed turns the job red"
+
     run = Run("none", base | {"version": "9.9.9"}).expect(1, "", "release v9.9.9 of OWNER/aogauge has no aogauge-v9.9.9")
     Run("no-version", base | {"version": "newest; true"}).expect(1, "", "is no release")
     whole = archive.read_bytes()

@@ -9,16 +9,19 @@ fail() {
     exit 1
 }
 
-# The worse of two exit codes, in the order of aogauge.
+# The worse of two exit codes, in the order of aogauge; the second is one that this gave.
 worse() {
     local code
+    case $1 in
+        [0-6]) ;;
+        *) fail "aogauge ended with $1: it was ended from outside, or it has a bug" ;;
+    esac
     for code in 2 4 5 3 1 6 0; do
         if [ "$1" = "$code" ] || [ "$2" = "$code" ]; then
             echo "$code"
             return
         fi
     done
-    fail "aogauge ended with $1: it was ended from outside, or it has a bug"
 }
 
 # A wrong word is found before an hour of rendering, not after.
