@@ -167,7 +167,7 @@ def installs(archive):
     commit = git("rev-parse", "HEAD").strip()
     run = Run("commit", base | {"suite": "smoke", "args": "--dry-run"}, ref=commit)
     assert "built from source" not in run.log and "aogauge 0.1.0" in run.log, run.log
-    for name, ref in (("other-commit", "0" * 40), ("branch", "main"), ("folder", "")):
+    for name, ref in (("other-commit", "0" * 40), ("branch", "v0.1-next"), ("folder", "")):
         run = Run(name, base, ref=ref, repository="OWNER/aogauge" if ref else "", built_before=True, workspace=suite(WORK / name))
         run.expect(0, "pass", "built from source")
         assert run.used["actions/cache"]["key"].startswith("aogauge-Linux-X64-"), run.used

@@ -27,13 +27,12 @@ build() {
     exit 0
 }
 
-# The action's release is asked for by a tag such as v0.1 or v0.1.0, or by the commit of its tag.
+# The action's release is asked for by a tag, v0.1.0 or v0.1, or by the commit of its tag.
 is_release() {
-    case $ACTION_REF in
-        v[0-9]*) ;;
-        *[!0-9a-f]* | '') return 1 ;;
-        *) git ls-remote "$GITHUB_SERVER_URL/$ACTION_REPOSITORY" "refs/tags/$tag" "refs/tags/$tag^{}" | grep -q "^$ACTION_REF" ;;
-    esac
+    [ "$ACTION_REF" != "$tag" ] || return 0
+    [ "$ACTION_REF" != "${tag%.*}" ] || return 0
+    [[ $ACTION_REF =~ ^[0-9a-f]{40}$ ]] || return 1
+    git ls-remote "$GITHUB_SERVER_URL/$ACTION_REPOSITORY" "refs/tags/$tag" "refs/tags/$tag^{}" | grep -q "^$ACTION_REF"
 }
 
 get() { curl --fail --silent --show-error --location --retry 3 --output "$2" "$releases/$1"; }
