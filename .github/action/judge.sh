@@ -92,7 +92,10 @@ if [ "$code" != 2 ] && [ "$code" != 4 ] && [ -f "$OUT/record.json" ]; then
         fi
     fi
     for format in ${REPORTS//,/ }; do
-        aogauge report "--format=$format" -- "$OUT"
+        case $format in
+            json) aogauge report --format=json -- "$OUT" > "$OUT/report.json" ;;
+            *) aogauge report "--format=$format" -- "$OUT" ;;
+        esac
     done
     for file in report.html report.md; do
         if [ -f "$OUT/$file" ]; then
