@@ -248,9 +248,20 @@ def is_no_shell():
     yield f"{len(names)} names that are commands or options, in every input, run nothing"
 
 
+def is_documented():
+    page = (ROOT / "docs/ci.md").read_text()
+    for name in [*ACTION["inputs"], *ACTION["outputs"]]:
+        assert f"`{name}`" in page, f"docs/ci.md does not tell of {name}"
+    for name, value in ACTION["inputs"].items():
+        row = next(line for line in page.splitlines() if line.startswith(f"| `{name}` |"))
+        told = row.split("|")[2].strip()
+        assert told == (f"`{value['default']}`" if value["default"] else "") or name in ("fail-on", "version"), row
+    yield "docs/ci.md tells of every input with its default, and of every output"
+
+
 def main():
     archive = release()
-    for part in (installs(archive), judges(), is_no_shell()):
+    for part in (is_documented(), installs(archive), judges(), is_no_shell()):
         for line in part:
             print(line, flush=True)
 
