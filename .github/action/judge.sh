@@ -92,10 +92,13 @@ if [ "$code" != 2 ] && [ "$code" != 4 ] && [ -f "$OUT/record.json" ]; then
         fi
     fi
     for format in ${REPORTS//,/ }; do
+        more=0
         case $format in
-            json) aogauge report --format=json -- "$OUT" > "$OUT/report.json" ;;
-            *) aogauge report "--format=$format" -- "$OUT" ;;
+            json) aogauge report --format=json -- "$OUT" > "$OUT/report.json" || more=$? ;;
+            *) aogauge report "--format=$format" -- "$OUT" || more=$? ;;
         esac
+        # A report that cannot be made (2) hides a verdict, so the step is red; the record and its path are there.
+        code=$(worse "$more" "$code") || exit 1
     done
     for file in report.html report.md; do
         if [ -f "$OUT/$file" ]; then
