@@ -203,8 +203,9 @@ fn an_imprecise_judge_is_told_once() {
 #[test]
 fn the_judge_is_cached_by_content() {
     let dir = tempfile::tempdir().unwrap();
-    let scene = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/library/curtain-arcade.toml"));
-    fs::write(dir.path().join("scene.toml"), scene.unwrap()).unwrap();
+    let shown = String::from_utf8(aogauge(dir.path(), &["scene", "show", "curtain-arcade"]).stdout).unwrap();
+    let scene = shown.split("\n# ").nth(1).unwrap().split_once('\n').unwrap().1;
+    fs::write(dir.path().join("scene.toml"), scene).unwrap();
     let suite = SUITE.split("[[estimator]]").take(2).collect::<Vec<_>>().join("[[estimator]]");
     fs::write(dir.path().join("suite.toml"), suite.replace("curtain-arcade", "scene.toml")).unwrap();
     let run = |more: &[&str]| {
