@@ -56,8 +56,7 @@ pub struct Args {
     /// Kubernetes, GitHub Actions or AOGAUGE_SHARD say.
     #[arg(long, value_name = "K/N")]
     shard: Option<String>,
-    /// Begin with 4 replicates, and add to them where a verdict is not decided yet. The
-    /// error level is kept. Clear cases end early, others go beyond the suite's replicates.
+    /// Begin with 4 replicates, and add to them where a verdict is not decided yet. The error level is kept. Clear cases end early, others go beyond the suite's replicates.
     #[arg(long)]
     until_sure: bool,
     /// The most replicates of a case with --until-sure; four times the suite's unless given.
@@ -70,7 +69,9 @@ pub struct Args {
     /// End the run at the first case that fails.
     #[arg(long)]
     fail_fast: bool,
-    /// A case that renders longer than so many seconds ends with an error.
+    /// What renders longer than so many seconds ends with an error: the judge of a scene, a
+    /// converged image, the pictures, or the replicates of a case (with --until-sure at each look). On a
+    /// GPU the image at hand is waited for.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     case_timeout: Option<Duration>,
     /// Only say what would be rendered, and what it costs.

@@ -21,6 +21,7 @@ mod rendering;
 mod set;
 mod shard;
 mod stop;
+mod tracing;
 mod unit;
 mod until_sure;
 
@@ -64,7 +65,9 @@ pub struct Means<'a> {
     pub machine: Machine,
     /// Asks it to end early.
     pub stop: Stop,
-    /// A case that takes longer ends with an error. It is looked at between replicates.
+    /// A unit that takes longer ends with an error: a judge, a converged image, pictures, or
+    /// the replicates of a case (at each look, where there are several). The CPU looks at it within
+    /// an image, other renderers between two.
     pub case_timeout: Option<Duration>,
     /// When no replicates are added any more where a plan goes on until it is sure. What
     /// then comes of it depends on the machine's speed.
