@@ -292,6 +292,23 @@ fn merged_shards_are_the_whole() {
     };
     refused(&parts[1..], 5, "of 3 shards 1 are missing: 2");
     refused(&[&parts[..], &parts[..1]].concat(), 2, "are both shard 2/3");
+    // Another commit of the same version may trace otherwise.
+    let of_other_build = |path: &Path| {
+        let mut shard: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
+        assert!(shard["build"].as_str().is_some_and(|b| b.len() == 64));
+        shard["build"] = json!("0".repeat(64));
+        shard.to_string()
+    };
+    let own: Vec<String> = parts.iter().map(|p| fs::read_to_string(p.join("shard.json")).unwrap()).collect();
+    fs::write(parts[0].join("shard.json"), of_other_build(&parts[0].join("shard.json"))).unwrap();
+    refused(&parts, 2, "their build of aogauge differs");
+    for part in &parts[1..] {
+        fs::write(part.join("shard.json"), of_other_build(&part.join("shard.json"))).unwrap();
+    }
+    refused(&parts, 2, "by another build of aogauge than this one");
+    for (part, own) in parts.iter().zip(own) {
+        fs::write(part.join("shard.json"), own).unwrap();
+    }
     let other = shards(3, "seed", &["--seed", "7"]);
     refused(&[&parts[1..], &other[1..2]].concat(), 2, "are not of one run: their seed differs");
     let four = shards(4, "four", &[]);

@@ -2,7 +2,7 @@
 //! they had been rendered here.
 
 use super::{
-    Means, Observer, Prepared, RunError,
+    BUILD, Means, Observer, Prepared, RunError,
     journal::{self, Journal},
     shard::ShardRecord,
 };
@@ -55,6 +55,7 @@ impl Shards {
         for (folder, shard) in &all {
             let differs = [
                 ("version of aogauge", shard.tool != one.tool),
+                ("build of aogauge", shard.build != one.build),
                 ("number of shards", shard.shard.of != one.shard.of),
                 ("seed", shard.seed != one.seed),
                 ("suite", shard.suite != one.suite && shard.identity != one.identity),
@@ -114,6 +115,10 @@ impl Shards {
         observer: &dyn Observer,
     ) -> Result<Record, MergeError> {
         let machine = self.machine();
+        if self.first().build != BUILD {
+            let why = "the shards were rendered by another build of aogauge than this one";
+            return Err(MergeError::Unfit(why.to_owned()));
+        }
         if prepared.identity(&machine) != self.first().identity {
             return Err(MergeError::Unfit(format!(
                 "the suite '{}' or one of its scenes is not what the shards were rendered from",

@@ -53,6 +53,9 @@ use sha2::{Digest, Sha256};
 use std::time::{Duration, Instant};
 use unit::{Unit, shard_of};
 
+/// What the program is built from, hashed.
+const BUILD: &str = env!("AOGAUGE_BUILD");
+
 /// With what a plan is run, and what ends it early.
 pub struct Means<'a> {
     /// Who renders the reference and the cases on `cpu`.
@@ -136,15 +139,15 @@ impl<'a> Prepared<'a> {
         self.steps(shard).iter().map(|s| s.rays).sum()
     }
 
-    /// Everything that decides which images come of it, but for the program: the suite,
-    /// the scenes' contents, seed, cases and the GPU, hashed.
+    /// Everything that decides which images come of it, hashed: the program's sources, the
+    /// suite, the scenes' contents, seed, cases and the GPU. The compiler and the kind of machine are not in it.
     pub fn identity(&self, machine: &Machine) -> String {
         let plan = self.plan;
         let gpu = plan.cases.iter().any(|c| c.renderer == "gpu").then_some(&machine.gpu);
         let scenes: Vec<[&str; 2]> = self.sets.iter().map(|s| [s.scene.name.as_str(), &s.hash]).collect();
         let cases: Vec<String> = plan.cases.iter().map(Case::id).collect();
         let all = serde_json::json!({
-            "tool": env!("CARGO_PKG_VERSION"), "suite": plan.suite.name, "file": plan.suite.file, "scenes": scenes,
+            "build": BUILD, "suite": plan.suite.name, "file": plan.suite.file, "scenes": scenes,
             "cases": cases, "seed": plan.seed, "filter": plan.filter, "gpu": gpu, "until-sure": plan.until_sure,
         });
         hex(&Sha256::digest(all.to_string()))

@@ -1,7 +1,7 @@
 //! A part of a run, on a machine of its own.
 
 use super::{
-    Means, Prepared, RunError,
+    BUILD, Means, Prepared, RunError,
     journal::{Done, Journal},
     mine,
     progress::Progress,
@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use std::{fmt, io::Write, path::Path, str::FromStr, time::Instant};
 
 /// Version of the format of `shard.json`.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Shards of one run, at most.
 const MOST: u32 = 65_536;
@@ -124,6 +124,8 @@ pub struct ShardRecord {
     pub version: u32,
     /// Version of the tool that wrote it.
     pub tool: String,
+    /// What that is built from, hashed.
+    pub build: String,
     /// Which part.
     pub shard: Shard,
     /// What decides which images come of the run, hashed: equal in all its shards.
@@ -219,6 +221,7 @@ impl Prepared<'_> {
         let record = ShardRecord {
             version: VERSION,
             tool: env!("CARGO_PKG_VERSION").to_owned(),
+            build: BUILD.to_owned(),
             shard,
             identity: self.identity(&means.machine),
             suite: suite.to_owned(),
