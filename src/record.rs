@@ -10,6 +10,7 @@ pub mod pictures;
 mod version;
 
 pub use folder::RecordFolder;
+pub(crate) use folder::{aside, is_aside};
 
 use crate::{
     disk::{DiskError, read_text},

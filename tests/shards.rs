@@ -325,6 +325,11 @@ fn merged_shards_are_the_whole() {
     bytes[last] ^= 1;
     fs::write(&image, bytes).unwrap();
     refused(&parts, 2, "it was damaged or replaced");
+    // A record that is there stays as it was.
+    let onto = merge(&parts, "merged");
+    assert_eq!(onto.status.code(), Some(2));
+    assert!(!dir.join("merged.previous").exists());
+    same(&dir.join("merged"));
     fs::remove_file(&image).unwrap();
     refused(&parts, 2, "cannot read the file");
     fs::write(dir.join("changed.toml"), SUITE.replace("look_rays = 1", "look_rays = 2")).unwrap();

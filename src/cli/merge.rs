@@ -2,10 +2,9 @@
 
 use super::{
     Exit, Failure, Format,
-    run::{bar, base, finish},
+    run::{bar, base, finish, tell_moved},
 };
 use crate::{
-    record::RecordFolder,
     run::{MergeError, Prepared, Shards, find_shards},
     suite::{Plan, Suite},
 };
@@ -21,7 +20,8 @@ pub struct Args {
     /// Folders of shards, or folders that hold such folders.
     #[arg(required = true)]
     shards: Vec<PathBuf>,
-    /// Folder for the record.
+    /// Folder for the record; none of the shards may be in it, and it in none of them. An
+    /// older record of that name is moved aside to NAME.previous.
     #[arg(long, default_value = "reports/latest")]
     out: PathBuf,
     /// Where the suite lies now; where the shards had it unless given.
@@ -53,7 +53,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     }
     plan.base = base(args.base.as_deref(), &suite)?;
     let prepared = Prepared::new(&plan)?;
-    let folder = RecordFolder::create(&args.out)?;
-    let record = shards.merge(&prepared, &folder, &bar())?;
+    let (folder, record) = shards.merge(&prepared, &args.out, &bar())?;
+    tell_moved(&folder);
     finish(&record, &folder, args.format)
 }

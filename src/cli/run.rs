@@ -32,8 +32,8 @@ pub struct Args {
     /// A built-in suite by name, or a suite file.
     #[arg(default_value = "thin-occluders")]
     suite: String,
-    /// Folder for record.json, report.md and the images. An older record of that
-    /// name is moved aside to NAME.previous.
+    /// Folder for record.json, report.md and the images. An older record or finished shard
+    /// of that name is moved aside to NAME.previous, in place of the one before.
     #[arg(long, default_value = "reports/latest")]
     out: PathBuf,
     /// Seed of all randomness; the suite's unless given.
@@ -228,13 +228,26 @@ fn folder(
 ) -> Result<RecordFolder, Failure> {
     // Another build of the program may round otherwise.
     let program = if args.fresh { None } else { crate::judge_cache::program() };
-    let Some(program) = program else { return Ok(RecordFolder::create(&args.out)?) };
+    let Some(program) = program else {
+        let folder = RecordFolder::create(&args.out)?;
+        tell_moved(&folder);
+        return Ok(folder);
+    };
     let shard = shard.map_or_else(String::new, |s| s.to_string());
     let folder = RecordFolder::resume(&args.out, &format!("{}\n{program}\n{shard}\n", prepared.identity(machine)))?;
+    tell_moved(&folder);
     if folder.is_resumed() {
         tell("aogauge: going on where an unfinished run of the same plan ended (--fresh begins anew)");
     }
     Ok(folder)
+}
+
+/// Says where the record or shard is that was in the way.
+pub(super) fn tell_moved(folder: &RecordFolder) {
+    if let Some(moved) = folder.moved() {
+        let [from, to] = [folder.path(), moved].map(Path::display);
+        tell(&format!("aogauge: what was in {from} is now in {to}"));
+    }
 }
 
 /// Writes the report, and says how it went.
