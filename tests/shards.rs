@@ -441,3 +441,16 @@ fn a_plan_is_told_filtered_and_ended_early() {
     assert!(record["incomplete"].as_str().unwrap().contains("at the first failure"), "{stderr}");
     assert!(record["cases"][0]["error"].as_str().unwrap().contains("longer than 0.001 s (--case-timeout)"));
 }
+
+/// More shards than units: one without is done as soon as it begins.
+#[test]
+fn an_empty_shard_is_a_shard() {
+    let dir = WHOLE.dir.path();
+    let out = dir.join("empty");
+    let empty = (1..=64).map(|k| format!("{k}/64")).find(|shard| {
+        let told = run(dir, &out, &["--shard", shard, "--dry-run"]);
+        assert_eq!(told.status.code(), Some(0), "{}", String::from_utf8_lossy(&told.stderr));
+        told.stdout.is_empty()
+    });
+    assert_eq!(run(dir, &out, &["--shard", &empty.unwrap()]).status.code(), Some(0));
+}

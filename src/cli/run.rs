@@ -187,7 +187,8 @@ fn prepare(
     }
     let prepared = Prepared::new(&plan)?;
     if args.dry_run {
-        return dry_run::tell_plan(&prepared, shard, &args.out);
+        let replicates = suite.file.replicates.get();
+        return dry_run::tell_plan(&prepared, shard, &args.out, plan.until_sure.map(|most| [replicates, most]));
     }
     let machine = match &gpu {
         None => Machine::here(missing.to_owned(), None),
