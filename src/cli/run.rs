@@ -21,7 +21,7 @@ use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::{
     path::{Path, PathBuf},
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 /// Render a suite, measure, judge, and write a record and its report.
@@ -56,14 +56,15 @@ pub struct Args {
     /// Kubernetes, GitHub Actions or AOGAUGE_SHARD say.
     #[arg(long, value_name = "K/N")]
     shard: Option<String>,
-    /// Begin with 4 replicates, and add to them where a verdict is not decided yet. The error level is kept. Clear cases end early, others go beyond the suite's replicates.
+    /// Begin with 4 replicates, and double them where a verdict is not decided
+    /// yet. The error level is kept. Clear cases end early, others go beyond the suite's replicates.
     #[arg(long)]
     until_sure: bool,
     /// The most replicates of a case with --until-sure; four times the suite's unless given.
     #[arg(long, requires = "until_sure", value_parser = clap::value_parser!(u32).range(2..=1024))]
     max_replicates: Option<u32>,
-    /// With --until-sure, add no replicates after so many seconds. What is decided then
-    /// depends on how fast the machine is.
+    /// With --until-sure, add no replicates after so many seconds. Each case has 4 even so.
+    /// What is decided then depends on how fast the machine is. A shard has this time for itself.
     #[arg(long, requires = "until_sure", value_name = "SECONDS", value_parser = seconds)]
     max_time: Option<Duration>,
     /// End the run at the first case that fails.
@@ -205,7 +206,7 @@ fn prepare(
         cache: cache.as_ref(),
         stop,
         case_timeout: args.case_timeout,
-        until: args.max_time.and_then(|t| Instant::now().checked_add(t)),
+        max_time: args.max_time,
         fail_fast: args.fail_fast,
         ..Means::new(&Cpu, machine)
     };

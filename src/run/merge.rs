@@ -15,6 +15,7 @@ use std::{
     collections::BTreeSet,
     fs,
     path::{Path, PathBuf},
+    time::Duration,
 };
 
 /// Why shards cannot be merged.
@@ -61,6 +62,7 @@ impl Shards {
                 ("suite", shard.suite != one.suite && shard.identity != one.identity),
                 ("filter", shard.filter != one.filter),
                 ("way to go on until sure", shard.until_sure != one.until_sure),
+                ("time to go on until sure", shard.max_time != one.max_time),
                 ("platform", shard.platform != one.platform),
                 ("GPU", shard.machine.gpu != one.machine.gpu && shard.identity != one.identity),
                 ("content of the suite or of a scene", shard.identity != one.identity),
@@ -129,7 +131,12 @@ impl Shards {
             part.copy(folder.path())?;
             journal.note(part.done)?;
         }
-        let means = Means { is_merge: true, ..Means::new(&Nobody, machine) };
+        let means = Means {
+            is_merge: true,
+            ended: self.all.iter().flat_map(|(_, s)| s.ended.clone()).collect(),
+            max_time: self.first().max_time.and_then(|s| Duration::try_from_secs_f64(s).ok()),
+            ..Means::new(&Nobody, machine)
+        };
         let mut record = prepared.found(&means, &folder, observer).map_err(|e| match e {
             RunError::Disk(e) => MergeError::Disk(e),
             e => MergeError::Unfit(e.to_string()),

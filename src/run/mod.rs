@@ -39,7 +39,10 @@ use crate::{
     judge_cache::JudgeCache,
     layers::hex,
     pooled::pooled,
-    record::{CaseRecord, Machine, Record, RecordFolder, SceneRecord, SuiteInfo, Summary, Timing, VERSION},
+    record::{
+        CaseRecord, Machine, Record, RecordFolder, SceneRecord, SuiteInfo, Summary, Timing, Undecided, UntilSure,
+        VERSION,
+    },
     render::Renderer,
     suite::{Case, EstimatorFile, Plan, Suite},
 };
@@ -72,13 +75,15 @@ pub struct Means<'a> {
     /// the replicates of a case (at each look, where there are several). The CPU looks at it within
     /// an image, other renderers between two.
     pub case_timeout: Option<Duration>,
-    /// When no replicates are added any more where a plan goes on until it is sure. What
-    /// then comes of it depends on the machine's speed.
-    pub until: Option<Instant>,
+    /// After how long no replicates are added any more where a plan goes on until it is sure.
+    /// What then comes of it depends on the machine's speed.
+    pub max_time: Option<Duration>,
     /// Whether the first case that fails ends the run.
     pub fail_fast: bool,
     /// Whether all images are there, and a missing one is an error.
     pub(crate) is_merge: bool,
+    /// In a merge: what [`Means::max_time`] ended in the shards.
+    pub(crate) ended: Vec<Undecided>,
 }
 
 impl<'a> Means<'a> {
@@ -91,9 +96,10 @@ impl<'a> Means<'a> {
             machine,
             stop: Stop::default(),
             case_timeout: None,
-            until: None,
+            max_time: None,
             fail_fast: false,
             is_merge: false,
+            ended: Vec::new(),
         }
     }
 }
@@ -174,9 +180,10 @@ impl<'a> Prepared<'a> {
         let mut timing = timing();
         let progress = Progress::new(observer, self.cost(None));
         let (mut scenes, mut cases) = (Vec::new(), Vec::new());
-        let mut ended = None;
+        let until = means.max_time.and_then(|t| start.checked_add(t));
+        let (mut ended, mut stopped, mut undecided) = (None, false, Vec::new());
         for set in &self.sets {
-            let studio = Studio { set, means, journal: Journal { folder }, progress: &progress };
+            let studio = Studio { set, means, journal: Journal { folder }, progress: &progress, until };
             let mut rendered = Rendered::default();
             let counts = studio.scene(&mut rendered)?;
             rendered.note(&set.scene.name, &mut timing);
@@ -188,19 +195,29 @@ impl<'a> Prepared<'a> {
                 means.stop.ask();
             }
             cases.extend(records);
+            stopped |= counts.stopped;
+            undecided.extend(counts.undecided);
         }
-        if means.stop.is_asked() && ended.is_none() && cases.iter().any(|c| c.error.as_deref() == Some(NOT_RENDERED)) {
-            ended = Some("it was interrupted".to_owned());
-        }
+        // A run that was asked to stop when all was done is whole.
+        let is_short = stopped || cases.iter().any(|c| c.error.as_deref() == Some(NOT_RENDERED));
+        let early = ended.unwrap_or_else(|| "it was interrupted".to_owned());
+        let end = End {
+            incomplete: Some(early).filter(|_| means.stop.is_asked() && is_short),
+            until_sure: self.plan.until_sure.map(|max_replicates| UntilSure {
+                max_replicates,
+                max_time: means.max_time.map(|t| t.as_secs_f64()),
+                undecided,
+            }),
+        };
         timing.seconds = start.elapsed().as_secs_f64();
-        Ok(self.record(means.machine.clone(), timing, ended, scenes, cases))
+        Ok(self.record(means.machine.clone(), timing, end, scenes, cases))
     }
 
     fn record(
         &self,
         machine: Machine,
         timing: Timing,
-        incomplete: Option<String>,
+        end: End,
         scenes: Vec<SceneRecord>,
         cases: Vec<CaseRecord>,
     ) -> Record {
@@ -221,7 +238,8 @@ impl<'a> Prepared<'a> {
             seed: plan.seed,
             machine,
             filter: plan.filter.clone(),
-            incomplete,
+            until_sure: end.until_sure,
+            incomplete: end.incomplete,
             summary: Summary::new(&verdicts, &idle_gates, &scenes, &cases),
             pooled: pooled(&suite, &scenes, &cases),
             verdicts,
@@ -232,6 +250,13 @@ impl<'a> Prepared<'a> {
             timing,
         }
     }
+}
+
+/// How a run came to its end.
+struct End {
+    /// Why it was early.
+    incomplete: Option<String>,
+    until_sure: Option<UntilSure>,
 }
 
 /// The units of a scene; of a shard its own part. Where a run goes on until it is sure, what

@@ -74,6 +74,8 @@ pub(super) struct Studio<'a> {
     pub means: &'a Means<'a>,
     pub journal: Journal<'a>,
     pub progress: &'a Progress<'a>,
+    /// When no replicates are added any more.
+    pub until: Option<Instant>,
 }
 
 impl Studio<'_> {
@@ -228,6 +230,25 @@ impl Studio<'_> {
         }
         self.journal.note(&done)?;
         Ok(Some((product, done, trouble)))
+    }
+
+    /// Leaves no more images of a case than it is measured from: what an unfinished run had
+    /// rendered for a look that this one did not come to.
+    pub fn trim(&self, case: &Case, replicates: u32, rendered: &mut Rendered) -> Result<(), DiskError> {
+        let Some(Ok(images)) = rendered.images.get_mut(&case.id()) else { return Ok(()) };
+        if images.replicates.len() <= replicates as usize {
+            return Ok(());
+        }
+        images.replicates.truncate(replicates as usize);
+        images.hash = pixel_hash(&moments(&images.replicates, self.set.view.pixels()).0);
+        let (unit, images) = (Unit::Case(case), images.clone());
+        let path = self.journal.folder.path().join(journal::file(self.set.plan, &self.set.scene.name, &unit));
+        self.layers(&unit, &Product::Case(images)).write(&path)?;
+        for done in rendered.done.iter_mut().filter(|d| d.unit == case.id()) {
+            done.sha256 = Some(journal::sha256(&path)?);
+            self.journal.note(done)?;
+        }
+        Ok(())
     }
 
     /// The images of a unit as the file that they are kept in.

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     disk::{DiskError, read_text, write_whole},
-    record::{Machine, RecordFolder, SHARD},
+    record::{Budget, Machine, RecordFolder, SHARD, Undecided},
     suite::Platform,
 };
 use schemars::JsonSchema;
@@ -139,8 +139,11 @@ pub struct ShardRecord {
     /// What the names of cases had to contain.
     pub filter: Option<String>,
     /// The most replicates of a run that goes on until it is sure.
-    #[serde(default)]
     pub until_sure: Option<u32>,
+    /// Then: after so many seconds no replicates were added.
+    pub max_time: Option<f64>,
+    /// Then: what `max_time` ended.
+    pub ended: Vec<Undecided>,
     /// Where it ran.
     pub machine: Machine,
     /// When it began, UTC.
@@ -201,13 +204,18 @@ impl Prepared<'_> {
         let timing = timing();
         let progress = Progress::new(observer, self.cost(Some(shard)));
         let journal = Journal { folder };
-        let mut units = Vec::new();
+        let until = means.max_time.and_then(|t| start.checked_add(t));
+        let (mut units, mut ended, mut stopped) = (Vec::new(), Vec::new(), false);
         for set in &self.sets {
-            let studio = Studio { set, means, journal, progress: &progress };
+            let studio = Studio { set, means, journal, progress: &progress, until };
             let mut rendered = Rendered::default();
             let own = mine(set, Some(shard));
             match self.plan.until_sure {
-                Some(_) if !own.is_empty() => drop(studio.scene(&mut rendered)?),
+                Some(_) if !own.is_empty() => {
+                    let counts = studio.scene(&mut rendered)?;
+                    stopped |= counts.stopped;
+                    ended.extend(counts.undecided.into_iter().filter(|u| u.by == Budget::MaxTime));
+                }
                 _ => studio.render(&own, self.plan.suite.file.replicates.get(), &mut rendered)?,
             }
             let failed = rendered.done.iter().any(|d| d.error.is_some());
@@ -229,12 +237,20 @@ impl Prepared<'_> {
             platform: self.plan.platform,
             filter: self.plan.filter.clone(),
             until_sure: self.plan.until_sure,
+            max_time: means.max_time.map(|t| t.as_secs_f64()),
+            ended,
             machine: means.machine.clone(),
             began: timing.began,
             seconds: start.elapsed().as_secs_f64(),
             threads: timing.threads,
             units,
-            incomplete: (missing > 0).then(|| format!("it ended early: {missing} units are not rendered")),
+            incomplete: (missing > 0 || stopped).then(|| {
+                let what = match missing {
+                    0 => "not all replicates that it asks for are rendered".to_owned(),
+                    _ => format!("{missing} units are not rendered"),
+                };
+                format!("it ended early: {what}")
+            }),
         };
         let path = folder.path().join(SHARD);
         let text = serde_json::to_string_pretty(&record)
