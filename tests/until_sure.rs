@@ -276,6 +276,60 @@ fn a_record_holds_the_replicates_that_it_tells_of() {
     assert!(was_killed && Some(there as u64) == case["replicates"].as_u64(), "{there}: {case}");
 }
 
+const ARCADE: &str = r#"
+description = "x"
+scenes = ["curtain-arcade", "plane"]
+rays = [4]
+replicates = 8
+seed = 1
+converged_rays = 64
+look_rays = 1
+judge = { precision = 0.2, paths = 4, replicates = 8, max_replicates = 16 }
+[[estimator]]
+name = "classic"
+kind = "classic"
+[[gate]]
+name = "g"
+metric = "contrast-error"
+"#;
+
+#[test]
+fn a_gate_against_the_base_is_looked_at_in_one_piece_and_in_shards() {
+    fs::write(DIR.path().join("base.toml"), format!("{ARCADE}against = 'base'\nmax = 0.01")).unwrap();
+    let base = out("base");
+    let mut first = aogauge(&["run", "base.toml", "--renderer", "cpu", "--no-cache", "--seed", "2", "--out"]);
+    ok(&first.arg(&base).output().unwrap());
+    let given = ["--base", base.to_str().unwrap()];
+    let whole = out("base-whole");
+    command_of("base.toml", "64", &whole, &given).output().unwrap();
+    let whole = record(&whole);
+    // Noise of two judges and of 8 replicates decides nothing at a first look.
+    let replicates = whole["cases"][0]["replicates"].as_u64().unwrap();
+    assert!(replicates > 4 && whole["verdicts"][0]["p_holds"].is_object(), "{}", whole["verdicts"]);
+    let parts: Vec<PathBuf> = (1..=2).map(|k| out(&format!("base-{k}"))).collect();
+    for (k, part) in (1..).zip(&parts) {
+        ok(&command_of("base.toml", "64", part, &[&given[..], &["--shard", &format!("{k}/2")]].concat())
+            .output()
+            .unwrap());
+    }
+    let merged = out("base-merged");
+    let ended = merge(&parts, &merged, &given);
+    assert!(ended.status.code() != Some(2), "{}", String::from_utf8_lossy(&ended.stderr));
+    assert_eq!(record(&merged), whole);
+    for (base, says) in [
+        (vec![], "a base record: give it here, too (--base)"),
+        (vec!["--base", merged.to_str().unwrap()], "the base record is not that of the shards"),
+    ] {
+        let refused = merge(&parts, &out("base-refused"), &base);
+        ends_with(&refused, 2);
+        assert!(
+            String::from_utf8_lossy(&refused.stderr).contains(says),
+            "{}",
+            String::from_utf8_lossy(&refused.stderr)
+        );
+    }
+}
+
 #[test]
 fn the_cost_of_going_on_is_not_told_as_a_bound() {
     let told = run(&out("nothing"), &["--dry-run"]);

@@ -27,7 +27,8 @@ pub struct Args {
     /// Where the suite lies now; where the shards had it unless given.
     #[arg(long)]
     suite: Option<String>,
-    /// The folder of an earlier record, for gates `against = "base"`.
+    /// The folder of an earlier record, for gates `against = "base"`. Of shards that were
+    /// run --until-sure, the one that they were given.
     #[arg(long, value_name = "DIR")]
     base: Option<PathBuf>,
     /// What is printed on standard output: nothing, or the record.

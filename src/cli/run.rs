@@ -39,9 +39,9 @@ pub struct Args {
     /// Seed of all randomness; the suite's unless given.
     #[arg(long)]
     seed: Option<u32>,
-    /// The folder of an earlier record, for gates `against = "base"`. Of shards, give
-    /// it to merge.
-    #[arg(long, value_name = "DIR", conflicts_with = "shard")]
+    /// The folder of an earlier record, for gates `against = "base"`. Of shards, give it to
+    /// merge; with --until-sure to all of them, too.
+    #[arg(long, value_name = "DIR")]
     base: Option<PathBuf>,
     /// Who renders.
     #[arg(long, value_enum, default_value_t)]
@@ -177,6 +177,9 @@ fn prepare(
     };
     let mut plan = Plan::new(suite, platform, args.seed);
     plan.base = base(args.base.as_deref(), suite)?;
+    if args.base.is_some() && shard.is_some() && !args.until_sure {
+        tell("aogauge: --base is of no use to a shard without --until-sure: give it to merge");
+    }
     let most = args.max_replicates.unwrap_or_else(|| suite.file.replicates.get().saturating_mul(4).min(1024));
     plan.until_sure = args.until_sure.then_some(most);
     if let Some(filter) = &args.filter {

@@ -76,7 +76,7 @@ impl Set<'_> {
         }
         let judged = self.judge(folder, rendered)?;
         let cases = self.case_records(rendered, &judged, counts);
-        let scene = self.scene_record(folder, rendered, judged, counts)?;
+        let scene = self.scene_record(folder, rendered, &judged, counts)?;
         Ok((Some(scene), cases))
     }
 

@@ -63,6 +63,7 @@ impl Shards {
                 ("filter", shard.filter != one.filter),
                 ("way to go on until sure", shard.until_sure != one.until_sure),
                 ("time to go on until sure", shard.max_time != one.max_time),
+                ("base record", shard.base != one.base),
                 ("platform", shard.platform != one.platform),
                 ("GPU", shard.machine.gpu != one.machine.gpu && shard.identity != one.identity),
                 ("content of the suite or of a scene", shard.identity != one.identity),
@@ -152,12 +153,22 @@ impl Shards {
     /// Whether the shards are of this program and this plan.
     fn check(&self, prepared: &Prepared<'_>, machine: &Machine) -> Result<(), MergeError> {
         let first = self.first();
-        let why = if first.build != BUILD {
-            "the shards were rendered by another build of aogauge than this one".to_owned()
-        } else if first.identity != prepared.identity(machine) {
-            format!("the suite '{}' or one of its scenes is not what the shards were rendered from", first.suite)
-        } else {
-            return Ok(());
+        let why = match (first.base.is_some(), prepared.base().is_some()) {
+            _ if first.build != BUILD => {
+                "the shards were rendered by another build of aogauge than this one".to_owned()
+            }
+            (true, false) => {
+                "what decided how many replicates the shards have was a base record: give it here, too (--base)"
+                    .to_owned()
+            }
+            (false, true) => "the shards were rendered without a base record, which would have decided how many \
+                              replicates they have: leave out --base"
+                .to_owned(),
+            _ if first.base != prepared.base() => "the base record is not that of the shards".to_owned(),
+            _ if first.identity != prepared.identity(machine) => {
+                format!("the suite '{}' or one of its scenes is not what the shards were rendered from", first.suite)
+            }
+            _ => return Ok(()),
         };
         Err(MergeError::Unfit(why))
     }

@@ -35,7 +35,7 @@ pub use stop::Stop;
 mod mutations;
 
 use crate::{
-    gate::{Evidence, judge},
+    gate::{Evidence, Gate, judge},
     judge_cache::JudgeCache,
     layers::hex,
     pooled::pooled,
@@ -146,7 +146,8 @@ impl<'a> Prepared<'a> {
     }
 
     /// Everything that decides which images come of it, hashed: the program's sources, the
-    /// suite, the scenes' contents, seed, cases and the GPU. The compiler and the kind of machine are not in it.
+    /// suite, the scenes' contents, seed, cases and the GPU, and where it goes on until it is
+    /// sure, the base. The compiler and the kind of machine are not in it.
     pub fn identity(&self, machine: &Machine) -> String {
         let plan = self.plan;
         let gpu = plan.cases.iter().any(|c| c.renderer == "gpu").then_some(&machine.gpu);
@@ -155,8 +156,17 @@ impl<'a> Prepared<'a> {
         let all = serde_json::json!({
             "build": BUILD, "suite": plan.suite.name, "file": plan.suite.file, "scenes": scenes,
             "cases": cases, "seed": plan.seed, "filter": plan.filter, "gpu": gpu, "until-sure": plan.until_sure,
+            "base": self.base(),
         });
         hex(&Sha256::digest(all.to_string()))
+    }
+
+    /// What is read of the base, hashed, where it decides how many replicates there are.
+    pub(crate) fn base(&self) -> Option<String> {
+        let is_read = self.plan.until_sure.is_some() && self.plan.suite.gates.iter().any(Gate::is_against_base);
+        let base = self.plan.base.as_ref().filter(|_| is_read)?;
+        let read = serde_json::json!([base.suite, base.scenes, base.cases]);
+        Some(hex(&Sha256::digest(read.to_string())))
     }
 
     /// Runs the plan and commits its record. What an unfinished run left in the folder

@@ -142,6 +142,8 @@ pub struct ShardRecord {
     pub until_sure: Option<u32>,
     /// Then: after so many seconds no replicates were added.
     pub max_time: Option<f64>,
+    /// Then: what is read of the base record, hashed, where a gate is against it.
+    pub base: Option<String>,
     /// Then: what `max_time` ended.
     pub ended: Vec<Undecided>,
     /// Where it ran.
@@ -238,6 +240,7 @@ impl Prepared<'_> {
             filter: self.plan.filter.clone(),
             until_sure: self.plan.until_sure,
             max_time: means.max_time.map(|t| t.as_secs_f64()),
+            base: self.base(),
             ended,
             machine: means.machine.clone(),
             began: timing.began,

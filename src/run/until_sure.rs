@@ -18,7 +18,7 @@ use super::{
 };
 use crate::{
     gate::{Evidence, Verdict, family_at_most, judge},
-    record::{Budget, CaseRecord, Undecided},
+    record::{Budget, CaseRecord, SceneRecord, Undecided},
     stats::decided,
     suite::{Case, Plan},
 };
@@ -42,6 +42,7 @@ fn block(plan: &Plan<'_>, case: &Case) -> u32 {
 
 /// What is found of a scene before a run is at its end, and may end it.
 struct Sight<'a> {
+    scene: SceneRecord,
     judged: &'a Result<Judged, Unjudged>,
     /// Tests that all verdicts of the plan come to, at most.
     family: usize,
@@ -64,7 +65,11 @@ impl Studio<'_> {
         let judged = self.set.judge(self.journal.folder, rendered)?;
         let plan = self.set.plan;
         let scenes: Vec<&str> = plan.scenes().map(|s| s.name.as_str()).collect();
-        let sight = Sight { judged: &judged, family: family_at_most(&plan.suite.gates, &scenes, &plan.cases) };
+        let sight = Sight {
+            scene: self.set.scene_facts(rendered, &judged),
+            judged: &judged,
+            family: family_at_most(&plan.suite.gates, &scenes, &plan.cases),
+        };
         let counts = self.until_sure(most, &sight, rendered)?;
         if !counts.stopped {
             for case in self.set.cases() {
@@ -138,7 +143,7 @@ impl Studio<'_> {
             suite: &suite_info(self.set.plan),
             gpu: "",
             filter: Some(""),
-            scenes: &[],
+            scenes: std::slice::from_ref(&sight.scene),
             cases: &cases,
             base: self.set.plan.base.as_ref(),
         };
