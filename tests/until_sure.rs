@@ -330,6 +330,24 @@ fn a_gate_against_the_base_is_looked_at_in_one_piece_and_in_shards() {
     }
 }
 
+/// The limit holds at the first look; whether it warns takes more of them.
+#[test]
+fn a_warning_is_looked_at_until_it_is_decided() {
+    let warning = out("warning");
+    let limits = |warn: f64| format!("{ARCADE}max = 1.0\nwarn = {{ max = {warn} }}");
+    fs::write(DIR.path().join("warn.toml"), limits(0.01)).unwrap();
+    ok(&command_of("warn.toml", "256", &warning, &[]).output().unwrap());
+    let clear = record(&warning);
+    assert_eq!(counts(&clear, "curtain-arcade"), BTreeSet::from([(4, 1)]));
+    assert_eq!(clear["verdicts"][0]["outcome"], "warn");
+    // Near what is measured.
+    let value = clear["verdicts"][0]["metric"]["value"].as_f64().unwrap();
+    fs::write(DIR.path().join("warn.toml"), limits(value)).unwrap();
+    ok(&command_of("warn.toml", "64", &warning, &[]).output().unwrap());
+    let near = record(&warning);
+    assert!(counts(&near, "curtain-arcade").first().unwrap().0 > 4, "{}", near["verdicts"]);
+}
+
 #[test]
 fn the_cost_of_going_on_is_not_told_as_a_bound() {
     let told = run(&out("nothing"), &["--dry-run"]);

@@ -56,7 +56,7 @@ pub struct Args {
     /// Kubernetes, GitHub Actions or AOGAUGE_SHARD say.
     #[arg(long, value_name = "K/N")]
     shard: Option<String>,
-    /// Begin with 4 replicates, and double them where a verdict is not decided
+    /// Begin with 4 replicates, and double them where a verdict or a warning is not decided
     /// yet. The error level is kept. Clear cases end early, others go beyond the suite's replicates.
     #[arg(long)]
     until_sure: bool,

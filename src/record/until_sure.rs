@@ -11,7 +11,7 @@ pub struct UntilSure {
     pub max_replicates: u32,
     /// After so many seconds none were added; null without end.
     pub max_time: Option<f64>,
-    /// What a budget ended before all its verdicts were decided.
+    /// What a budget ended before all its verdicts and warnings were decided.
     pub undecided: Vec<Undecided>,
 }
 

@@ -2,7 +2,7 @@
 //!
 //! The cases of one scene and ray count make a block: they are compared with each other,
 //! so they keep in step. A block begins with 4 replicates and doubles them until each of its
-//! verdicts is decided, or a budget ends. Each look spends its share of the error
+//! verdicts is decided, and whether it warns, or a budget ends. Each look spends its share of the error
 //! ([`spending`](crate::stats::spending)), and is corrected by Bonferroni over all the verdicts that the plan
 //! can come to ([`decided`](crate::stats::decided)): so what ends a block depends on nothing outside
 //! its scene, on one machine or on many, and stands when Holm's correction is made over
@@ -150,17 +150,30 @@ impl Studio<'_> {
         judge(&evidence).0
     }
 
-    /// The blocks with a verdict that more replicates may decide.
+    /// The blocks with a verdict, or a warning, that more replicates may decide.
     fn undecided(&self, verdicts: &[Verdict], family: usize) -> BTreeSet<u32> {
         let open = verdicts.iter().filter_map(|v| {
             let case = v.case.as_ref()?;
             let p = [v.p_holds?.raw, v.p_broken?.raw];
             let alpha = 1.0 - v.confidence;
-            let sure = decided(p, family, v.spent, alpha);
+            let is_broken = decided([p[1], f64::NAN], family, v.spent, alpha);
+            let warns = |p: [f64; 2]| decided(p, family, v.spent, alpha);
+            let sure = is_broken || decided(p, family, v.spent, alpha) && warning(v).is_none_or(warns);
             Some(block(self.set.plan, case)).filter(|_| !sure)
         });
         open.collect()
     }
+}
+
+/// The p-values of what warns, that it is kept and that it is broken; None where nothing
+/// can warn.
+fn warning(verdict: &Verdict) -> Option<[f64; 2]> {
+    let (limit, broken) = (verdict.warn?, verdict.p_warn_broken?);
+    let held = match &verdict.against {
+        Some(other) => other.difference.estimate(),
+        None => verdict.metric.estimate(),
+    };
+    Some([limit.p_holds(&held?), broken.raw])
 }
 
 #[cfg(test)]
