@@ -1,4 +1,5 @@
-//! What ends a run before all is rendered: time, and who asks it to.
+//! What ends a run before all is rendered: a gate that is red for sure, time, and who asks
+//! it to.
 
 #![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
 
@@ -40,6 +41,13 @@ fn command(folder: &Path, suite: &str, more: &str) -> Command {
     command
 }
 
+/// Runs a suite, and returns its exit code and record.
+fn run(suite: &str, more: &str) -> (Option<i32>, Value) {
+    let dir = tempfile::tempdir().unwrap();
+    let ended = command(dir.path(), suite, more).output().unwrap();
+    (ended.status.code(), record(dir.path(), &ended))
+}
+
 fn record(folder: &Path, ended: &Output) -> Value {
     let text = fs::read_to_string(folder.join("out/record.json"));
     serde_json::from_str(&text.unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&ended.stderr)))).unwrap()
@@ -47,6 +55,49 @@ fn record(folder: &Path, ended: &Output) -> Value {
 
 fn rendered(record: &Value) -> usize {
     record["cases"].as_array().unwrap().iter().filter(|c| c["error"].is_null()).count()
+}
+
+/// An open plane reads 1 in every replicate, so that one case is enough.
+#[test]
+fn fail_fast_ends_at_the_first_gate_that_is_red() {
+    let red = format!("{SUITE}max = 0.5");
+    for (more, by_then) in [("--fail-fast", 1), ("--fail-fast --until-sure", 2)] {
+        let (code, record) = run(&red, more);
+        assert_eq!((code, rendered(&record)), (Some(5), by_then), "{record}");
+        let incomplete = record["incomplete"].as_str().unwrap();
+        let says = "it ended at the first failure (--fail-fast): plane/classic/cpu/4 fails 'limit'";
+        assert_eq!(incomplete, says);
+        assert_eq!([&record["verdicts"][0]["gate"], &record["verdicts"][0]["outcome"]], ["limit", "fail"]);
+    }
+    let (code, record) = run(&red, "");
+    assert_eq!((code, rendered(&record)), (Some(1), 4));
+    // A known failure that is one ends nothing; one that is mended does.
+    let known = |limit: &str| format!("{SUITE}{limit}\nknown_failure = 'so it is'");
+    let (code, record) = run(&known("max = 0.5"), "--fail-fast");
+    assert_eq!((code, rendered(&record)), (Some(0), 4), "{record}");
+    let (code, record) = run(&known("min = 0.5"), "--fail-fast");
+    assert_eq!((code, rendered(&record)), (Some(5), 1), "{record}");
+}
+
+/// Whatever is not sure yet does not end it, and what ends it stays red: the record up to
+/// the failure agrees with that of the whole run.
+#[test]
+fn fail_fast_needs_evidence() {
+    let suite = |max: f64| {
+        SUITE
+            .replace("scenes = [\"plane\"]", "scenes = [\"curtain-open\"]")
+            .replace("region = \"all\"", "region = \"footprint\"")
+            + &format!("rays = [4]\nmax = {max}")
+    };
+    let (_, whole) = run(&suite(0.5), "");
+    let first = whole["verdicts"].as_array().unwrap().iter().find(|v| v["case"]["rays"] == 4).unwrap();
+    let [value, se] = ["value", "se"].map(|n| first["metric"][n].as_f64().unwrap());
+    assert!(se > 0.0);
+    let (code, record) = run(&suite(value - se), "--fail-fast");
+    assert!(code == Some(6) && rendered(&record) == 4 && record["incomplete"].is_null(), "{record}");
+    let (code, record) = run(&suite(value - 100.0 * se), "--fail-fast");
+    assert!(code == Some(5) && rendered(&record) == 3, "{record}");
+    assert_eq!(record["verdicts"][0]["outcome"], "fail");
 }
 
 /// A judge whose first image takes minutes.

@@ -433,13 +433,17 @@ fn a_plan_is_told_filtered_and_ended_early() {
     assert_eq!(record["filter"], "curtain-open/extended/cpu/8");
     assert_eq!(run(dir, &dir.join("none"), &["--filter", "curtain-closed"]).status.code(), Some(4));
 
-    // No case is done within a millisecond; the first that fails ends the run.
+    // Nothing is done within a millisecond; the first that fails ends the run.
+    let late = "plane/converged/classic: it took longer than 0.001 s (--case-timeout): 0 of 4 replicates";
     let slow = run(dir, &dir.join("slow"), &["--case-timeout", "0.001", "--fail-fast"]);
     let stderr = String::from_utf8_lossy(&slow.stderr);
     assert_eq!(slow.status.code(), Some(5), "{stderr}");
     let record: Value = serde_json::from_str(&fs::read_to_string(dir.join("slow/record.json")).unwrap()).unwrap();
-    assert!(record["incomplete"].as_str().unwrap().contains("at the first failure"), "{stderr}");
-    assert!(record["cases"][0]["error"].as_str().unwrap().contains("longer than 0.001 s (--case-timeout)"));
+    let incomplete = record["incomplete"].as_str().unwrap();
+    assert!(incomplete.contains("at the first failure (--fail-fast): ") && incomplete.contains(late), "{stderr}");
+    let part = run(dir, &dir.join("slow-part"), &["--case-timeout", "0.001", "--fail-fast", "--shard", "1/1"]);
+    let stderr = String::from_utf8_lossy(&part.stderr);
+    assert!(part.status.code() == Some(5) && stderr.contains(late), "{stderr}");
 }
 
 /// More shards than units: one without is done as soon as it begins.

@@ -67,7 +67,10 @@ pub struct Args {
     /// What is decided then depends on how fast the machine is. A shard has this time for itself.
     #[arg(long, requires = "until_sure", value_name = "SECONDS", value_parser = seconds)]
     max_time: Option<Duration>,
-    /// End the run at the first case that fails.
+    /// End the run at the first failure: a judge, an image or a case that ends with an error,
+    /// or a gate that is red for sure, whatever is still to come. It is looked at after each case (with
+    /// --until-sure after each look at a scene); of a shard without --until-sure, errors alone count. The
+    /// record is then marked incomplete, exit code 5, unless all was done.
     #[arg(long)]
     fail_fast: bool,
     /// What renders longer than so many seconds ends with an error: the judge of a scene, a

@@ -78,7 +78,8 @@ pub struct Means<'a> {
     /// After how long no replicates are added any more where a plan goes on until it is sure.
     /// What then comes of it depends on the machine's speed.
     pub max_time: Option<Duration>,
-    /// Whether the first case that fails ends the run.
+    /// Whether the first failure ends the run: a unit with an error, or a verdict that is
+    /// surely red whatever the others come to.
     pub fail_fast: bool,
     /// Whether all images are there, and a missing one is an error.
     pub(crate) is_merge: bool,
@@ -199,12 +200,8 @@ impl<'a> Prepared<'a> {
             rendered.note(&set.scene.name, &mut timing);
             let (scene, records) = set.measure(folder, &rendered, &counts)?;
             scenes.extend(scene);
-            let failed = records.iter().find(|c| c.error.as_deref().is_some_and(|e| e != NOT_RENDERED));
-            if let Some(case) = failed.filter(|_| means.fail_fast && !means.stop.is_asked()) {
-                ended = Some(format!("it ended at the first failure (--fail-fast): {}", case.case.id()));
-                means.stop.ask();
-            }
             cases.extend(records);
+            ended = ended.or(rendered.ended.as_deref().map(at_first_failure));
             stopped |= counts.stopped;
             undecided.extend(counts.undecided);
         }
@@ -267,6 +264,10 @@ struct End {
     /// Why it was early.
     incomplete: Option<String>,
     until_sure: Option<UntilSure>,
+}
+
+fn at_first_failure(what: &str) -> String {
+    format!("it ended at the first failure (--fail-fast): {what}")
 }
 
 /// The units of a scene; of a shard its own part. Where a run goes on until it is sure, what

@@ -58,7 +58,12 @@ pub(super) struct Rendered {
     pub done: Vec<Done>,
     /// Why the judge's images could not be kept for other runs.
     pub cache_trouble: Option<String>,
+    /// The failure that ended the run.
+    pub ended: Option<String>,
 }
+
+/// Looks at what is rendered after each unit, and may say why the run is to end.
+pub(super) type Watch<'a> = &'a (dyn Fn(&Rendered) -> Option<String> + Sync);
 
 /// Images of a unit, as they were rendered.
 enum Product {
@@ -84,20 +89,31 @@ impl Studio<'_> {
     /// # Errors
     /// Where a file cannot be written. What a renderer gets wrong costs its unit alone.
     pub fn render(&self, units: &[Unit<'_>], replicates: u32, rendered: &mut Rendered) -> Result<(), DiskError> {
+        self.render_watched(units, replicates, rendered, &|_| None)
+    }
+
+    /// The same, watched.
+    pub fn render_watched(
+        &self,
+        units: &[Unit<'_>],
+        replicates: u32,
+        rendered: &mut Rendered,
+        watch: Watch<'_>,
+    ) -> Result<(), DiskError> {
         let (on_gpu, on_cpu): (Vec<&Unit<'_>>, Vec<&Unit<'_>>) = units.iter().partition(|u| u.is_on_gpu());
         let shared = Mutex::new((rendered, Ok(())));
         // Of this thread; the GPU's is opened by the thread that uses it.
         let cpu_lane = || {
             let mut loaded = None;
             let open = || self.means.cpu.load(&self.set.geometry);
-            self.lane(&on_cpu, replicates, &mut loaded, &open, &shared);
+            self.lane(&on_cpu, replicates, &mut loaded, &open, watch, &shared);
         };
         let gpu = self.means.gpu;
         let gpu_lane = || {
             let mut loaded = None;
             let none = || RenderError::NoAdapter("the plan asks for one".into());
             let open = || gpu.ok_or_else(none).and_then(|g| g.load(&self.set.geometry));
-            self.lane(&on_gpu, replicates, &mut loaded, &open, &shared);
+            self.lane(&on_gpu, replicates, &mut loaded, &open, watch, &shared);
         };
         if self.means.machine.gpu_is_software == Some(false) && !on_gpu.is_empty() && !on_cpu.is_empty() {
             self.side_by_side(cpu_lane, gpu_lane);
@@ -122,6 +138,7 @@ impl Studio<'_> {
         replicates: u32,
         loaded: &mut Option<Result<Box<dyn Loaded + 'l>, RenderError>>,
         open: &dyn Fn() -> Result<Box<dyn Loaded + 'l>, RenderError>,
+        watch: Watch<'_>,
         shared: &Mutex<(&mut Rendered, Result<(), DiskError>)>,
     ) {
         for unit in units {
@@ -149,6 +166,14 @@ impl Studio<'_> {
                 Ok(Some((product, done, trouble))) => {
                     guard.0.cache_trouble = guard.0.cache_trouble.take().or(trouble);
                     guard.0.take(unit, product, done, self.set.view.pixels());
+                    let so_far: &Rendered = guard.0;
+                    let failed = || self.failure(unit, &id, so_far).or_else(|| watch(so_far));
+                    let failed = if self.means.fail_fast { failed() } else { None };
+                    if let Some(why) = failed {
+                        guard.0.ended.get_or_insert(why);
+                        self.means.stop.ask();
+                        return;
+                    }
                 }
                 Ok(None) => return,
                 Err(e) => {
@@ -159,6 +184,15 @@ impl Studio<'_> {
             }
             self.progress.end(unit.cost(self.set.plan, self.set.pixels()));
         }
+    }
+
+    /// Why the images of a unit cannot be used.
+    fn failure(&self, unit: &Unit<'_>, id: &str, rendered: &Rendered) -> Option<String> {
+        let fault = match unit {
+            Unit::Converged(method) => rendered.truths.get(method).and_then(|t| t.fault.clone()),
+            _ => rendered.done.iter().find(|d| d.unit == id).and_then(|d| d.error.clone()),
+        };
+        fault.map(|why| format!("{id}: {why}"))
     }
 
     /// One unit, from the journal or rendered; None where the run ends before it is done.

@@ -1,7 +1,7 @@
 //! A part of a run, on a machine of its own.
 
 use super::{
-    BUILD, Means, Prepared, RunError,
+    BUILD, Means, Prepared, RunError, at_first_failure,
     journal::{Done, Journal},
     mine,
     progress::Progress,
@@ -207,7 +207,7 @@ impl Prepared<'_> {
         let progress = Progress::new(observer, self.cost(Some(shard)));
         let journal = Journal { folder };
         let until = means.max_time.and_then(|t| start.checked_add(t));
-        let (mut units, mut ended, mut stopped) = (Vec::new(), Vec::new(), false);
+        let (mut units, mut ended, mut early, mut stopped) = (Vec::new(), Vec::new(), None, false);
         for set in &self.sets {
             let studio = Studio { set, means, journal, progress: &progress, until };
             let mut rendered = Rendered::default();
@@ -220,11 +220,8 @@ impl Prepared<'_> {
                 }
                 _ => studio.render(&own, self.plan.suite.file.replicates.get(), &mut rendered)?,
             }
-            let failed = rendered.done.iter().any(|d| d.error.is_some());
+            early = early.or(rendered.ended.as_deref().map(at_first_failure));
             units.extend(rendered.done);
-            if failed && means.fail_fast {
-                means.stop.ask();
-            }
         }
         units.sort_by(|a, b| a.unit.cmp(&b.unit));
         let missing = self.steps(Some(shard)).len() - units.len();
@@ -252,7 +249,7 @@ impl Prepared<'_> {
                     0 => "not all replicates that it asks for are rendered".to_owned(),
                     _ => format!("{missing} units are not rendered"),
                 };
-                format!("it ended early: {what}")
+                format!("{}: {what}", early.as_deref().unwrap_or("it ended early"))
             }),
         };
         let path = folder.path().join(SHARD);

@@ -52,15 +52,17 @@ impl Studio<'_> {
     /// Renders a scene as the plan says. Returns how many replicates each case has.
     pub fn scene(&self, rendered: &mut Rendered) -> Result<Counts, RunError> {
         let replicates = self.set.plan.suite.file.replicates.get();
-        let Some(most) = self.set.plan.until_sure else {
+        let all = Counts::all(replicates);
+        let until_sure = self.set.plan.until_sure;
+        if until_sure.is_none() && !self.means.fail_fast {
             self.render(&self.set.units(), replicates, rendered)?;
-            return Ok(Counts::all(replicates));
-        };
+            return Ok(all);
+        }
         let (cases, first): (Vec<Unit<'_>>, Vec<Unit<'_>>) =
             self.set.units().into_iter().partition(|u| matches!(u, Unit::Case(_)));
         self.render(&first, replicates, rendered)?;
         if !self.set.is_ready(rendered) || cases.is_empty() || self.means.stop.is_asked() {
-            return Ok(Counts::default());
+            return Ok(if until_sure.is_some() { Counts::default() } else { all });
         }
         let judged = self.set.judge(self.journal.folder, rendered)?;
         let plan = self.set.plan;
@@ -69,6 +71,11 @@ impl Studio<'_> {
             scene: self.set.scene_facts(rendered, &judged),
             judged: &judged,
             family: family_at_most(&plan.suite.gates, &scenes, &plan.cases),
+        };
+        let Some(most) = until_sure else {
+            let red = |rendered: &Rendered| self.red(&sight, &self.verdicts(&sight, rendered, &all));
+            self.render_watched(&cases, replicates, rendered, &red)?;
+            return Ok(all);
         };
         let counts = self.until_sure(most, &sight, rendered)?;
         if !counts.stopped {
@@ -113,6 +120,12 @@ impl Studio<'_> {
             }
             let verdicts = self.verdicts(sight, rendered, &counts);
             open = self.undecided(&verdicts, sight.family).into_iter().filter(|b| open.contains(b)).collect();
+            if let Some(why) = self.red(sight, &verdicts).filter(|_| self.means.fail_fast) {
+                rendered.ended.get_or_insert(why);
+                self.means.stop.ask();
+                counts.stopped = !open.is_empty();
+                return Ok(counts);
+            }
             before = n;
         }
         counts.undecided.extend(open.into_iter().map(|b| end(b, before, Budget::MaxReplicates)));
@@ -162,6 +175,17 @@ impl Studio<'_> {
             Some(block(self.set.plan, case)).filter(|_| !sure)
         });
         open.collect()
+    }
+
+    /// A gate that is surely red, whatever the other verdicts of the plan come to: as for
+    /// what ends a block, by Bonferroni's correction, so that Holm's leaves it red.
+    fn red(&self, sight: &Sight<'_>, verdicts: &[Verdict]) -> Option<String> {
+        let known = |gate: &str| self.set.plan.suite.gates.iter().any(|g| g.name == gate && g.known_failure.is_some());
+        let is_red = |v: &&Verdict| {
+            let p = if known(&v.gate) { v.p_holds } else { v.p_broken };
+            p.is_some_and(|p| decided([p.raw, f64::NAN], sight.family, v.spent, 1.0 - v.confidence))
+        };
+        verdicts.iter().find(is_red).map(|v| format!("{} fails '{}'", v.subject(), v.gate))
     }
 }
 
