@@ -8,10 +8,13 @@
 mod end;
 mod folder;
 pub mod pictures;
+mod until_sure;
 mod version;
 
 pub use end::End;
 pub use folder::RecordFolder;
+pub(crate) use folder::{aside, is_aside};
+pub use until_sure::{Budget, Undecided, UntilSure};
 
 use crate::{
     disk::{DiskError, read_text},
@@ -62,6 +65,10 @@ pub struct Record {
     /// What the names of cases had to contain, where only some were asked for.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub filter: Option<String>,
+    /// How replicates were added until verdicts were decided; absent where each case has
+    /// the suite's.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub until_sure: Option<UntilSure>,
     /// Why the run ended early; absent where it did not.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub incomplete: Option<String>,
@@ -364,7 +371,8 @@ pub struct CaseRecord {
     /// absent where that was once, when all were there.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub looks: Option<u32>,
-    /// Replicates in its image; the suite's where absent.
+    /// Replicates that its metrics are of, the first ones of its image: all of them, unless
+    /// the run is incomplete. The suite's where absent.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub replicates: Option<u32>,
     /// Its metrics by occluder, where the scene shows two or more.

@@ -110,3 +110,12 @@ fn counts_that_are_given_twice_agree() {
     assert!(github.contains("include-hidden-files: true"));
     assert!(github.contains("strategy.job-index") && github.contains("strategy.job-total"));
 }
+
+/// The workflow lies in the repository of whoever judges their own renderer, and the Job may fail.
+#[test]
+fn they_work_in_any_repository_and_after_any_end() {
+    let github = example("github.yml");
+    assert!(github.contains("cargo install --locked --root installed") && !github.contains("cargo build"));
+    let kubernetes = example("kubernetes.yaml");
+    assert!(kubernetes.contains("Complete|Failed") && !kubernetes.contains("--for=condition=complete"));
+}

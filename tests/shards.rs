@@ -293,6 +293,23 @@ fn merged_shards_are_the_whole() {
     };
     refused(&parts[1..], 5, "of 3 shards 1 are missing: 2");
     refused(&[&parts[..], &parts[..1]].concat(), 2, "are both shard 2/3");
+    // Another commit of the same version may trace otherwise.
+    let of_other_build = |path: &Path| {
+        let mut shard: Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
+        assert!(shard["build"].as_str().is_some_and(|b| b.len() == 64));
+        shard["build"] = json!("0".repeat(64));
+        shard.to_string()
+    };
+    let own: Vec<String> = parts.iter().map(|p| fs::read_to_string(p.join("shard.json")).unwrap()).collect();
+    fs::write(parts[0].join("shard.json"), of_other_build(&parts[0].join("shard.json"))).unwrap();
+    refused(&parts, 2, "their build of aogauge differs");
+    for part in &parts[1..] {
+        fs::write(part.join("shard.json"), of_other_build(&part.join("shard.json"))).unwrap();
+    }
+    refused(&parts, 2, "by another build of aogauge than this one");
+    for (part, own) in parts.iter().zip(own) {
+        fs::write(part.join("shard.json"), own).unwrap();
+    }
     let other = shards(3, "seed", &["--seed", "7"]);
     refused(&[&parts[1..], &other[1..2]].concat(), 2, "are not of one run: their seed differs");
     let four = shards(4, "four", &[]);
@@ -309,6 +326,11 @@ fn merged_shards_are_the_whole() {
     bytes[last] ^= 1;
     fs::write(&image, bytes).unwrap();
     refused(&parts, 2, "it was damaged or replaced");
+    // A record that is there stays as it was.
+    let onto = merge(&parts, "merged");
+    assert_eq!(onto.status.code(), Some(2));
+    assert!(!dir.join("merged.previous").exists());
+    same(&dir.join("merged"));
     fs::remove_file(&image).unwrap();
     refused(&parts, 2, "cannot read the file");
     fs::write(dir.join("changed.toml"), SUITE.replace("look_rays = 1", "look_rays = 2")).unwrap();
@@ -412,11 +434,28 @@ fn a_plan_is_told_filtered_and_ended_early() {
     assert_eq!(record["filter"], "curtain-open/extended/cpu/8");
     assert_eq!(run(dir, &dir.join("none"), &["--filter", "curtain-closed"]).status.code(), Some(4));
 
-    // No case is done within a millisecond; the first that fails ends the run.
+    // Nothing is done within a millisecond; the first that fails ends the run.
+    let late = "plane/converged/classic: it took longer than 0.001 s (--case-timeout): 0 of 4 replicates";
     let slow = run(dir, &dir.join("slow"), &["--case-timeout", "0.001", "--fail-fast"]);
     let stderr = String::from_utf8_lossy(&slow.stderr);
     assert_eq!(slow.status.code(), Some(5), "{stderr}");
     let record: Value = serde_json::from_str(&fs::read_to_string(dir.join("slow/record.json")).unwrap()).unwrap();
-    assert!(record["incomplete"].as_str().unwrap().contains("at the first failure"), "{stderr}");
-    assert!(record["cases"][0]["error"].as_str().unwrap().contains("longer than 0.001 s (--case-timeout)"));
+    let incomplete = record["incomplete"].as_str().unwrap();
+    assert!(incomplete.contains("at the first failure (--fail-fast): ") && incomplete.contains(late), "{stderr}");
+    let part = run(dir, &dir.join("slow-part"), &["--case-timeout", "0.001", "--fail-fast", "--shard", "1/1"]);
+    let stderr = String::from_utf8_lossy(&part.stderr);
+    assert!(part.status.code() == Some(5) && stderr.contains(late), "{stderr}");
+}
+
+/// More shards than units: one without is done as soon as it begins.
+#[test]
+fn an_empty_shard_is_a_shard() {
+    let dir = WHOLE.dir.path();
+    let out = dir.join("empty");
+    let empty = (1..=64).map(|k| format!("{k}/64")).find(|shard| {
+        let told = run(dir, &out, &["--shard", shard, "--dry-run"]);
+        assert_eq!(told.status.code(), Some(0), "{}", String::from_utf8_lossy(&told.stderr));
+        told.stdout.is_empty()
+    });
+    assert_eq!(run(dir, &out, &["--shard", &empty.unwrap()]).status.code(), Some(0));
 }

@@ -30,7 +30,7 @@ if [ -z "${SLURM_ARRAY_TASK_ID-}" ]; then
 fi
 
 # Slurm sends USR1 a minute before the time is up, and TERM on preemption and scancel.
-# Either way aogauge ends after the image it is at. After preemption Slurm itself starts the
+# Either way aogauge ends in good order. After preemption Slurm itself starts the
 # task again; when the time is up the task asks for it, and goes on where it ended.
 is_late='' signalled=yes
 # shellcheck disable=SC2329 # called by the traps

@@ -3,10 +3,9 @@
 use super::{
     Exit, Failure, Format,
     report::Beside,
-    run::{bar, base, finish},
+    run::{bar, base, finish, tell_moved},
 };
 use crate::{
-    record::RecordFolder,
     run::{MergeError, Prepared, Shards, find_shards},
     suite::{Plan, Suite},
 };
@@ -22,13 +21,15 @@ pub struct Args {
     /// Folders of shards, or folders that hold such folders.
     #[arg(required = true)]
     shards: Vec<PathBuf>,
-    /// Folder for the record.
+    /// Folder for the record; none of the shards may be in it, and it in none of them. An
+    /// older record of that name is moved aside to NAME.previous.
     #[arg(long, default_value = "reports/latest")]
     out: PathBuf,
     /// Where the suite lies now; where the shards had it unless given.
     #[arg(long)]
     suite: Option<String>,
-    /// The folder of an earlier record, for gates `against = "base"`.
+    /// The folder of an earlier record, for gates `against = "base"`. Of shards that were
+    /// run --until-sure, the one that they were given.
     #[arg(long, value_name = "DIR")]
     base: Option<PathBuf>,
     #[command(flatten)]
@@ -57,7 +58,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     }
     plan.base = base(args.base.as_deref(), &suite)?;
     let prepared = Prepared::new(&plan)?;
-    let folder = RecordFolder::create(&args.out)?;
-    let record = shards.merge(&prepared, &folder, &bar())?;
+    let (folder, record) = shards.merge(&prepared, &args.out, &bar())?;
+    tell_moved(&folder);
     finish(&record, &folder, &args.beside, args.format)
 }

@@ -27,7 +27,7 @@ use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::{
     path::{Path, PathBuf},
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 /// Render a suite, measure, judge, and write a record and its report.
@@ -38,16 +38,16 @@ pub struct Args {
     /// A built-in suite by name, or a suite file.
     #[arg(default_value = "thin-occluders")]
     suite: String,
-    /// Folder for record.json, its reports and the images. An older record of that
-    /// name is moved aside to NAME.previous.
+    /// Folder for record.json, its reports and the images. An older record or finished shard
+    /// of that name is moved aside to NAME.previous, in place of the one before.
     #[arg(long, default_value = "reports/latest")]
     out: PathBuf,
     /// Seed of all randomness; the suite's unless given.
     #[arg(long)]
     seed: Option<u32>,
-    /// The folder of an earlier record, for gates `against = "base"`. Of shards, give
-    /// it to merge.
-    #[arg(long, value_name = "DIR", conflicts_with = "shard")]
+    /// The folder of an earlier record, for gates `against = "base"`. Of shards, give it to
+    /// merge; with --until-sure to all of them, too.
+    #[arg(long, value_name = "DIR")]
     base: Option<PathBuf>,
     /// Who renders.
     #[arg(long, value_enum, default_value_t)]
@@ -62,21 +62,26 @@ pub struct Args {
     /// Kubernetes, GitHub Actions or AOGAUGE_SHARD say.
     #[arg(long, value_name = "K/N", conflicts_with_all = ["report", "image_base"])]
     shard: Option<String>,
-    /// Begin with 4 replicates, and add to them where a verdict is not decided yet. The
-    /// error level is kept. Clear cases end early, others go beyond the suite's replicates.
+    /// Begin with 4 replicates, and double them where a verdict or a warning is not decided
+    /// yet. The error level is kept. Clear cases end early, others go beyond the suite's replicates.
     #[arg(long)]
     until_sure: bool,
     /// The most replicates of a case with --until-sure; four times the suite's unless given.
     #[arg(long, requires = "until_sure", value_parser = clap::value_parser!(u32).range(2..=1024))]
     max_replicates: Option<u32>,
-    /// With --until-sure, add no replicates after so many seconds. What is decided then
-    /// depends on how fast the machine is.
+    /// With --until-sure, add no replicates after so many seconds. Each case has 4 even so.
+    /// What is decided then depends on how fast the machine is. A shard has this time for itself.
     #[arg(long, requires = "until_sure", value_name = "SECONDS", value_parser = seconds)]
     max_time: Option<Duration>,
-    /// End the run at the first case that fails.
+    /// End the run at the first failure: a judge, an image or a case that ends with an error,
+    /// or a gate that is red for sure, whatever is still to come. It is looked at after each case (with
+    /// --until-sure after each look at a scene); of a shard without --until-sure, errors alone count. The
+    /// record is then marked incomplete, exit code 5, unless all was done.
     #[arg(long)]
     fail_fast: bool,
-    /// A case that renders longer than so many seconds ends with an error.
+    /// What renders longer than so many seconds ends with an error: the judge of a scene, a
+    /// converged image, the pictures, or the replicates of a case (with --until-sure at each look). On a
+    /// GPU the image at hand is waited for.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     case_timeout: Option<Duration>,
     /// Only say what would be rendered, and what it costs.
@@ -184,6 +189,9 @@ fn prepare(
     };
     let mut plan = Plan::new(suite, platform, args.seed);
     plan.base = base(args.base.as_deref(), suite)?;
+    if args.base.is_some() && shard.is_some() && !args.until_sure {
+        tell("aogauge: --base is of no use to a shard without --until-sure: give it to merge");
+    }
     let most = args.max_replicates.unwrap_or_else(|| suite.file.replicates.get().saturating_mul(4).min(1024));
     plan.until_sure = args.until_sure.then_some(most);
     if let Some(filter) = &args.filter {
@@ -195,7 +203,8 @@ fn prepare(
     }
     let prepared = Prepared::new(&plan)?;
     if args.dry_run {
-        return dry_run::tell_plan(&prepared, shard, &args.out);
+        let replicates = suite.file.replicates.get();
+        return dry_run::tell_plan(&prepared, shard, &args.out, plan.until_sure.map(|most| [replicates, most]));
     }
     let machine = match &gpu {
         None => Machine::here(missing.to_owned(), None),
@@ -212,7 +221,7 @@ fn prepare(
         cache: cache.as_ref(),
         stop,
         case_timeout: args.case_timeout,
-        until: args.max_time.and_then(|t| Instant::now().checked_add(t)),
+        max_time: args.max_time,
         fail_fast: args.fail_fast,
         ..Means::new(&Cpu, machine)
     };
@@ -236,13 +245,26 @@ fn folder(
 ) -> Result<RecordFolder, Failure> {
     // Another build of the program may round otherwise.
     let program = if args.fresh { None } else { crate::judge_cache::program() };
-    let Some(program) = program else { return Ok(RecordFolder::create(&args.out)?) };
+    let Some(program) = program else {
+        let folder = RecordFolder::create(&args.out)?;
+        tell_moved(&folder);
+        return Ok(folder);
+    };
     let shard = shard.map_or_else(String::new, |s| s.to_string());
     let folder = RecordFolder::resume(&args.out, &format!("{}\n{program}\n{shard}\n", prepared.identity(machine)))?;
+    tell_moved(&folder);
     if folder.is_resumed() {
         tell("aogauge: going on where an unfinished run of the same plan ended (--fresh begins anew)");
     }
     Ok(folder)
+}
+
+/// Says where the record or shard is that was in the way.
+pub(super) fn tell_moved(folder: &RecordFolder) {
+    if let Some(moved) = folder.moved() {
+        let [from, to] = [folder.path(), moved].map(Path::display);
+        tell(&format!("aogauge: what was in {from} is now in {to}"));
+    }
 }
 
 /// Makes the reports, and says how it went.

@@ -20,14 +20,16 @@ pub struct RecordFolder {
     path: PathBuf,
     /// Whether an unfinished run of the same plan had begun to fill it.
     resumed: bool,
+    /// Where the record or shard went that was here.
+    moved: Option<PathBuf>,
     /// Held while it is filled; the system lets go of it if the run is killed.
     _lock: fs::File,
 }
 
 impl RecordFolder {
-    /// Makes an empty folder for a record. A record of that name is moved aside to
-    /// `NAME.previous` first, what a killed run left is removed; any other folder
-    /// that is not empty is refused.
+    /// Makes an empty folder for a record. A record of that name, or a finished shard, is
+    /// moved aside to `NAME.previous` first. What a killed run left is removed, unless there are
+    /// files among it that no run writes; such a folder is refused, and any other that is not empty.
     ///
     /// # Errors
     /// Where the folder cannot be written, holds something else, or another run fills
@@ -56,7 +58,7 @@ impl RecordFolder {
             Err(e) if e.kind() == io::ErrorKind::NotFound => false,
             Err(e) => return Err(DiskError::io(path, "use this as the output folder")(e)),
         };
-        let mut resumed = false;
+        let (mut resumed, mut moved) = (false, None);
         if occupied {
             let begun = path.join(BEGUN).exists();
             if !path.join(FILE).exists() && !path.join(super::SHARD).exists() && !begun {
@@ -76,10 +78,17 @@ impl RecordFolder {
                     remove(&path.join(stale))?;
                 }
                 sweep(path)?;
-            } else if path.join(FILE).exists() {
-                move_aside(path)?;
+            } else if path.join(FILE).exists() || path.join(super::SHARD).exists() {
+                moved = Some(move_aside(path)?);
             } else {
                 // What a killed run left is worth less than the record before it.
+                if let Some(foreign) = foreign(path, path)? {
+                    return Err(DiskError::content(
+                        &foreign,
+                        "no run writes this file, and it lies where an unfinished run would be removed: move it, or \
+                         name another output folder",
+                    ));
+                }
                 fs::remove_dir_all(path).map_err(DiskError::io(path, "remove what an unfinished run left"))?;
             }
         }
@@ -89,7 +98,7 @@ impl RecordFolder {
         if !resumed {
             write_whole(&begun.join(PLAN), |buffer| io::Write::write_all(buffer, plan.unwrap_or_default().as_bytes()))?;
         }
-        Ok(RecordFolder { path: path.to_owned(), resumed, _lock: lock })
+        Ok(RecordFolder { path: path.to_owned(), resumed, moved, _lock: lock })
     }
 
     /// Where it is.
@@ -100,6 +109,11 @@ impl RecordFolder {
     /// Whether it goes on where an unfinished run of the same plan ended.
     pub fn is_resumed(&self) -> bool {
         self.resumed
+    }
+
+    /// Where the record or finished shard went that was here before.
+    pub fn moved(&self) -> Option<&Path> {
+        self.moved.as_deref()
     }
 
     /// The folder of what the run alone needs.
@@ -172,13 +186,63 @@ fn remove(file: &Path) -> Result<(), DiskError> {
     }
 }
 
-/// Moves a record to `NAME.previous`, in place of the record before.
-fn move_aside(path: &Path) -> Result<(), DiskError> {
-    let mut aside = path.as_os_str().to_owned();
-    aside.push(".previous");
-    let aside = PathBuf::from(aside);
+/// A file in the folder of a run that no run writes.
+fn foreign(folder: &Path, top: &Path) -> Result<Option<PathBuf>, DiskError> {
+    let entries = fs::read_dir(folder).map_err(DiskError::io(folder, "list what an unfinished run left"))?;
+    for entry in entries.flatten() {
+        let path = entry.path();
+        let relative = path.strip_prefix(top).unwrap_or(&path);
+        if relative == Path::new(BEGUN) {
+            continue;
+        }
+        let is_folder = entry.file_type().is_ok_and(|t| t.is_dir());
+        let found = match is_folder && WRITTEN.iter().any(|(start, _)| relative.starts_with(start)) {
+            true => foreign(&path, top)?,
+            false => Some(path.clone()).filter(|_| is_folder || !is_written(relative)),
+        };
+        if found.is_some() {
+            return Ok(found);
+        }
+    }
+    Ok(None)
+}
+
+/// Folders that a run writes, and the ends of the names of their files.
+const WRITTEN: [(&str, &[&str]); 2] = [("images", &["exr"]), (super::pictures::PICTURES, &["png", "svg"])];
+
+/// Files that a run writes beside them: the record or shard, and reports.
+const FILES: [&str; 7] = [FILE, super::SHARD, "report.md", "report.html", "report.json", "junit.xml", "summary.md"];
+
+/// Whether a run writes a file of this name, relative to the record.
+fn is_written(file: &Path) -> bool {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let end = file.extension().unwrap_or_default().to_string_lossy();
+    is_part(&name)
+        || FILES.iter().any(|f| file == Path::new(f))
+        || WRITTEN.iter().any(|(folder, ends)| file.starts_with(folder) && ends.contains(&end.as_ref()))
+}
+
+/// What is put behind the name of a folder that is moved aside.
+const ASIDE: &str = ".previous";
+
+/// Where a record or shard is moved aside to: `NAME.previous`.
+pub(crate) fn aside(path: &Path) -> PathBuf {
+    // Without a slash at its end.
+    let mut aside = path.components().collect::<PathBuf>().into_os_string();
+    aside.push(ASIDE);
+    PathBuf::from(aside)
+}
+
+/// Whether a folder has the name of one that was moved aside.
+pub(crate) fn is_aside(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(ASIDE))
+}
+
+/// Moves a record or shard to `NAME.previous`, in place of what was moved there before.
+fn move_aside(path: &Path) -> Result<PathBuf, DiskError> {
+    let aside = aside(path);
     if aside.exists() {
-        if !aside.join(FILE).exists() && !aside.join(BEGUN).exists() {
+        if ![FILE, BEGUN, super::SHARD].iter().any(|mark| aside.join(mark).exists()) {
             return Err(DiskError::content(
                 &aside,
                 "the older record cannot be moved here: the folder holds something else",
@@ -186,5 +250,6 @@ fn move_aside(path: &Path) -> Result<(), DiskError> {
         }
         fs::remove_dir_all(&aside).map_err(DiskError::io(&aside, "remove the record before last"))?;
     }
-    fs::rename(path, &aside).map_err(DiskError::io(path, "move the older record aside"))
+    fs::rename(path, &aside).map_err(DiskError::io(path, "move the older record aside"))?;
+    Ok(aside)
 }

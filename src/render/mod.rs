@@ -12,6 +12,7 @@ mod indirect;
 pub mod lights;
 pub mod materials;
 pub mod path;
+pub(crate) mod patience;
 pub mod sampler;
 pub mod screen_space;
 pub mod smoothing;
@@ -159,6 +160,19 @@ pub trait Loaded {
     /// # Errors
     /// [`RenderError`] where the device fails; the next call may succeed.
     fn render(&mut self, job: &Job<'_>) -> Result<Frame, RenderError>;
+
+    /// The same, but None where it ended before it was done because `go_on` said no. A
+    /// renderer that cannot ask in between does not: it renders the whole image.
+    ///
+    /// # Errors
+    /// As [`Loaded::render`].
+    fn render_while(
+        &mut self,
+        job: &Job<'_>,
+        _go_on: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Option<Frame>, RenderError> {
+        self.render(job).map(Some)
+    }
 }
 
 /// Why an image could not be made.

@@ -11,8 +11,9 @@
 use super::{
     Geometry,
     ao::cosine_distributed,
-    gbuffer::{FAR_AWAY, GBuffer},
+    gbuffer::{FAR_AWAY, GBuffer, Surface},
     lights::{Aim, lambert},
+    patience::Patience,
     sampler::Sampler,
 };
 use crate::trace::{Hit, Ray};
@@ -37,24 +38,48 @@ pub fn irradiance(geometry: &Geometry, gbuffer: &GBuffer, paths: u32, seed: u32,
     colors(geometry, gbuffer, paths, seed, replicate).into_iter().map(luminance).collect()
 }
 
+/// [`irradiance`], but None as soon as `go_on` says no: it is asked now and then, by
+/// several threads.
+pub fn irradiance_while(
+    geometry: &Geometry,
+    gbuffer: &GBuffer,
+    paths: u32,
+    seed: u32,
+    replicate: u32,
+    go_on: &(dyn Fn() -> bool + Sync),
+) -> Option<Vec<f32>> {
+    let patience = Patience::new(go_on);
+    let colors = traced(geometry, gbuffer, [paths, seed, replicate], &patience);
+    (!patience.is_over()).then(|| colors.into_iter().map(luminance).collect())
+}
+
 /// [`irradiance`] by linear red, green and blue.
 pub fn colors(geometry: &Geometry, gbuffer: &GBuffer, paths: u32, seed: u32, replicate: u32) -> Vec<[f32; 3]> {
-    gbuffer
-        .surfaces
-        .par_iter()
-        .enumerate()
-        .with_min_len(32)
-        .map(|(pixel, surface)| {
-            surface.map_or([f32::NAN; 3], |s| {
-                let sampler = Sampler::new(seed, pixel as u32, replicate);
-                let mut sum = glam::DVec3::ZERO;
-                for i in 0..paths {
-                    sum += path(geometry, s.point, s.normal, &sampler, i).as_dvec3();
+    traced(geometry, gbuffer, [paths, seed, replicate], &Patience::new(&|| true))
+}
+
+/// [`colors`]; NaN where patience is over.
+pub(super) fn traced(
+    geometry: &Geometry,
+    gbuffer: &GBuffer,
+    [paths, seed, replicate]: [u32; 3],
+    patience: &Patience<'_>,
+) -> Vec<[f32; 3]> {
+    let pixel = |(pixel, surface): (usize, &Option<Surface>)| {
+        let skipped = patience.skips(pixel);
+        surface.as_ref().filter(|_| !skipped).map_or([f32::NAN; 3], |s| {
+            let sampler = Sampler::new(seed, pixel as u32, replicate);
+            let mut sum = glam::DVec3::ZERO;
+            for i in 0..paths {
+                sum += path(geometry, s.point, s.normal, &sampler, i).as_dvec3();
+                if patience.leaves(i) {
+                    break;
                 }
-                (sum / f64::from(paths)).as_vec3().to_array()
-            })
+            }
+            (sum / f64::from(paths)).as_vec3().to_array()
         })
-        .collect()
+    };
+    gbuffer.surfaces.par_iter().enumerate().with_min_len(32).map(pixel).collect()
 }
 
 /// One path from a surface to the light: an estimate of irradiance over pi.

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     metrics::{Absent, artifact::Method as Measured, judge::JudgedRegions, regions::Regions},
-    record::{CaseRecord, OccluderMetrics, RecordFolder, SceneRecord},
+    record::{CaseRecord, OccluderMetrics, RecordFolder, SceneRecord, Undecided},
     suite::Case,
 };
 
@@ -25,12 +25,16 @@ pub(super) struct Counts {
     of: BTreeMap<String, (u32, u32)>,
     /// For all others.
     every: Option<u32>,
+    /// What a budget ended.
+    pub undecided: Vec<Undecided>,
+    /// Whether the run was asked to stop while verdicts were not decided.
+    pub stopped: bool,
 }
 
 impl Counts {
     /// The same of all.
     pub fn all(replicates: u32) -> Self {
-        Counts { of: BTreeMap::new(), every: Some(replicates) }
+        Counts { every: Some(replicates), ..Counts::default() }
     }
 
     /// Replicates at a look.
@@ -72,7 +76,7 @@ impl Set<'_> {
         }
         let judged = self.judge(folder, rendered)?;
         let cases = self.case_records(rendered, &judged, counts);
-        let scene = self.scene_record(folder, rendered, judged, counts)?;
+        let scene = self.scene_record(folder, rendered, &judged, counts)?;
         Ok((Some(scene), cases))
     }
 
@@ -139,7 +143,7 @@ impl Set<'_> {
                 image: Some(case_image(case)),
                 hash: Some(own.hash.clone()),
                 metrics: metrics(&method, &others),
-                replicates: Some(own.replicates.len() as u32),
+                replicates: Some(replicates.len() as u32),
                 looks: counts.look(case),
                 occluders: self.by_occluder(index, &method, &classic_on, judged),
             });

@@ -21,6 +21,7 @@ mod rendering;
 mod set;
 mod shard;
 mod stop;
+mod tracing;
 mod unit;
 mod until_sure;
 
@@ -34,11 +35,14 @@ pub use stop::Stop;
 mod mutations;
 
 use crate::{
-    gate::{Evidence, judge},
+    gate::{Evidence, Gate, judge},
     judge_cache::JudgeCache,
     layers::hex,
     pooled::pooled,
-    record::{CaseRecord, Machine, Record, RecordFolder, SceneRecord, SuiteInfo, Summary, Timing, VERSION},
+    record::{
+        CaseRecord, Machine, Record, RecordFolder, SceneRecord, SuiteInfo, Summary, Timing, Undecided, UntilSure,
+        VERSION,
+    },
     render::Renderer,
     suite::{Case, EstimatorFile, Plan, Suite},
 };
@@ -52,6 +56,9 @@ use sha2::{Digest, Sha256};
 use std::time::{Duration, Instant};
 use unit::{Unit, shard_of};
 
+/// What the program is built from, hashed.
+const BUILD: &str = env!("AOGAUGE_BUILD");
+
 /// With what a plan is run, and what ends it early.
 pub struct Means<'a> {
     /// Who renders the reference and the cases on `cpu`.
@@ -64,15 +71,20 @@ pub struct Means<'a> {
     pub machine: Machine,
     /// Asks it to end early.
     pub stop: Stop,
-    /// A case that takes longer ends with an error. It is looked at between replicates.
+    /// A unit that takes longer ends with an error: a judge, a converged image, pictures, or
+    /// the replicates of a case (at each look, where there are several). The CPU looks at it within
+    /// an image, other renderers between two.
     pub case_timeout: Option<Duration>,
-    /// When no replicates are added any more where a plan goes on until it is sure. What
-    /// then comes of it depends on the machine's speed.
-    pub until: Option<Instant>,
-    /// Whether the first case that fails ends the run.
+    /// After how long no replicates are added any more where a plan goes on until it is sure.
+    /// What then comes of it depends on the machine's speed.
+    pub max_time: Option<Duration>,
+    /// Whether the first failure ends the run: a unit with an error, or a verdict that is
+    /// surely red whatever the others come to.
     pub fail_fast: bool,
     /// Whether all images are there, and a missing one is an error.
     pub(crate) is_merge: bool,
+    /// In a merge: what [`Means::max_time`] ended in the shards.
+    pub(crate) ended: Vec<Undecided>,
 }
 
 impl<'a> Means<'a> {
@@ -85,9 +97,10 @@ impl<'a> Means<'a> {
             machine,
             stop: Stop::default(),
             case_timeout: None,
-            until: None,
+            max_time: None,
             fail_fast: false,
             is_merge: false,
+            ended: Vec::new(),
         }
     }
 }
@@ -133,18 +146,28 @@ impl<'a> Prepared<'a> {
         self.steps(shard).iter().map(|s| s.rays).sum()
     }
 
-    /// Everything that decides which images come of it, but for the program: the suite,
-    /// the scenes' contents, seed, cases and the GPU, hashed.
+    /// Everything that decides which images come of it, hashed: the program's sources, the
+    /// suite, the scenes' contents, seed, cases and the GPU, and where it goes on until it is
+    /// sure, the base. The compiler and the kind of machine are not in it.
     pub fn identity(&self, machine: &Machine) -> String {
         let plan = self.plan;
         let gpu = plan.cases.iter().any(|c| c.renderer == "gpu").then_some(&machine.gpu);
         let scenes: Vec<[&str; 2]> = self.sets.iter().map(|s| [s.scene.name.as_str(), &s.hash]).collect();
         let cases: Vec<String> = plan.cases.iter().map(Case::id).collect();
         let all = serde_json::json!({
-            "tool": env!("CARGO_PKG_VERSION"), "suite": plan.suite.name, "file": plan.suite.file, "scenes": scenes,
+            "build": BUILD, "suite": plan.suite.name, "file": plan.suite.file, "scenes": scenes,
             "cases": cases, "seed": plan.seed, "filter": plan.filter, "gpu": gpu, "until-sure": plan.until_sure,
+            "base": self.base(),
         });
         hex(&Sha256::digest(all.to_string()))
+    }
+
+    /// What is read of the base, hashed, where it decides how many replicates there are.
+    pub(crate) fn base(&self) -> Option<String> {
+        let is_read = self.plan.until_sure.is_some() && self.plan.suite.gates.iter().any(Gate::is_against_base);
+        let base = self.plan.base.as_ref().filter(|_| is_read)?;
+        let read = serde_json::json!([base.suite, base.scenes, base.cases]);
+        Some(hex(&Sha256::digest(read.to_string())))
     }
 
     /// Runs the plan and commits its record. What an unfinished run left in the folder
@@ -168,33 +191,40 @@ impl<'a> Prepared<'a> {
         let mut timing = timing();
         let progress = Progress::new(observer, self.cost(None));
         let (mut scenes, mut cases) = (Vec::new(), Vec::new());
-        let mut ended = None;
+        let until = means.max_time.and_then(|t| start.checked_add(t));
+        let (mut ended, mut stopped, mut undecided) = (None, false, Vec::new());
         for set in &self.sets {
-            let studio = Studio { set, means, journal: Journal { folder }, progress: &progress };
+            let studio = Studio { set, means, journal: Journal { folder }, progress: &progress, until };
             let mut rendered = Rendered::default();
             let counts = studio.scene(&mut rendered)?;
             rendered.note(&set.scene.name, &mut timing);
             let (scene, records) = set.measure(folder, &rendered, &counts)?;
             scenes.extend(scene);
-            let failed = records.iter().find(|c| c.error.as_deref().is_some_and(|e| e != NOT_RENDERED));
-            if let Some(case) = failed.filter(|_| means.fail_fast && !means.stop.is_asked()) {
-                ended = Some(format!("it ended at the first failure (--fail-fast): {}", case.case.id()));
-                means.stop.ask();
-            }
             cases.extend(records);
+            ended = ended.or(rendered.ended.as_deref().map(at_first_failure));
+            stopped |= counts.stopped;
+            undecided.extend(counts.undecided);
         }
-        if means.stop.is_asked() && ended.is_none() && cases.iter().any(|c| c.error.as_deref() == Some(NOT_RENDERED)) {
-            ended = Some("it was interrupted".to_owned());
-        }
+        // A run that was asked to stop when all was done is whole.
+        let is_short = stopped || cases.iter().any(|c| c.error.as_deref() == Some(NOT_RENDERED));
+        let early = ended.unwrap_or_else(|| "it was interrupted".to_owned());
+        let end = End {
+            incomplete: Some(early).filter(|_| means.stop.is_asked() && is_short),
+            until_sure: self.plan.until_sure.map(|max_replicates| UntilSure {
+                max_replicates,
+                max_time: means.max_time.map(|t| t.as_secs_f64()),
+                undecided,
+            }),
+        };
         timing.seconds = start.elapsed().as_secs_f64();
-        Ok(self.record(means.machine.clone(), timing, ended, scenes, cases))
+        Ok(self.record(means.machine.clone(), timing, end, scenes, cases))
     }
 
     fn record(
         &self,
         machine: Machine,
         timing: Timing,
-        incomplete: Option<String>,
+        end: End,
         scenes: Vec<SceneRecord>,
         cases: Vec<CaseRecord>,
     ) -> Record {
@@ -215,7 +245,8 @@ impl<'a> Prepared<'a> {
             seed: plan.seed,
             machine,
             filter: plan.filter.clone(),
-            incomplete,
+            until_sure: end.until_sure,
+            incomplete: end.incomplete,
             summary: Summary::new(&verdicts, &idle_gates, &scenes, &cases),
             pooled: pooled(&suite, &scenes, &cases),
             verdicts,
@@ -226,6 +257,17 @@ impl<'a> Prepared<'a> {
             timing,
         }
     }
+}
+
+/// How a run came to its end.
+struct End {
+    /// Why it was early.
+    incomplete: Option<String>,
+    until_sure: Option<UntilSure>,
+}
+
+fn at_first_failure(what: &str) -> String {
+    format!("it ended at the first failure (--fail-fast): {what}")
 }
 
 /// The units of a scene; of a shard its own part. Where a run goes on until it is sure, what

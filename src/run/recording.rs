@@ -23,53 +23,62 @@ use crate::{
 use std::collections::BTreeMap;
 
 impl Set<'_> {
+    /// What is found of the scene, with its images, which are written.
     pub(super) fn scene_record(
         &self,
         folder: &RecordFolder,
         rendered: &Rendered,
-        judged: Result<Judged, Unjudged>,
+        judged: &Result<Judged, Unjudged>,
         counts: &Counts,
     ) -> Result<SceneRecord, RunError> {
         let methods = &self.plan.suite.methods;
         let pixels = self.view.pixels();
         let width = self.view.resolution[0];
-        let occluders = self.occluders.iter().enumerate();
-        let occluders =
-            occluders.map(|(i, o)| o.record(i, judged.as_ref().map_err(Unjudged::absent))).collect::<Vec<_>>();
-        let image = format!("images/{}/regions.exr", self.scene.name);
         let mut layers = Layers::new(self.view.resolution);
         for region in Region::ALL {
             layers = layers.with(&format!("region-{}", region.label()), self.regions.mask(region, pixels));
         }
-        let mut brighter = BTreeMap::new();
         for (&index, truth) in &rendered.truths {
-            let (method, converged) = (&methods[index], &truth.converged);
-            if let Ok(side) = measured(&[], converged, self.regions(index)).brighter() {
-                brighter.insert(method.name.clone(), side);
-            }
-            layers = layers.with(&format!("converged-{}", method.name), converged.mean.clone());
+            layers = layers.with(&format!("converged-{}", methods[index].name), truth.converged.mean.clone());
         }
-        layers.write(&folder.path().join(&image))?;
+        let mut scene = self.scene_facts(rendered, judged);
+        layers.write(&folder.path().join(&scene.image))?;
         let most = |method: usize| {
             let own = methods[method].rays;
             own.or_else(|| self.plan.suite.file.rays.iter().copied().max()).map_or(0, Rays::get)
         };
-        let mut profiles: Vec<profile::Curve> = self
+        scene.profiles = self
             .cases()
             .filter(|c| c.renderer == "cpu" && c.rays == most(self.method(c)))
             .filter_map(|c| Some(profile::of_method(&c.estimator, rendered.replicates(c, counts)?, width as usize)))
             .collect();
+        scene.profiles.extend(judged.as_ref().ok().map(|j| j.curve.clone()));
+        scene.convergence = self.convergence(rendered, counts);
+        Ok(scene)
+    }
+
+    /// What is known of the scene before its cases are: all but its profiles and how methods
+    /// converge. Gates need no more.
+    pub(super) fn scene_facts(&self, rendered: &Rendered, judged: &Result<Judged, Unjudged>) -> SceneRecord {
+        let occluders = self.occluders.iter().enumerate();
+        let occluders =
+            occluders.map(|(i, o)| o.record(i, judged.as_ref().map_err(Unjudged::absent))).collect::<Vec<_>>();
+        let mut brighter = BTreeMap::new();
+        for (&index, truth) in &rendered.truths {
+            if let Ok(side) = measured(&[], &truth.converged, self.regions(index)).brighter() {
+                brighter.insert(self.plan.suite.methods[index].name.clone(), side);
+            }
+        }
         let (judge, no_judge, judge_error) = match judged {
             Ok(judged) => {
                 brighter.insert(Judge::LABEL.to_owned(), judged.judge.regions.brighter);
-                profiles.push(judged.curve);
-                (Some(judged.record), None, None)
+                (Some(judged.record.clone()), None, None)
             }
-            Err(Unjudged::Absent(Absent(why))) => (None, Some(why), None),
-            Err(Unjudged::Failed(why)) => (None, None, Some(why)),
+            Err(Unjudged::Absent(Absent(why))) => (None, Some(why.clone()), None),
+            Err(Unjudged::Failed(why)) => (None, None, Some(why.clone())),
         };
         let radius = f64::from(self.scene.ao.radius);
-        Ok(SceneRecord {
+        SceneRecord {
             name: self.scene.name.clone(),
             description: self.scene.description.clone(),
             control: self.scene.control,
@@ -78,7 +87,9 @@ impl Set<'_> {
             secondary_radius: f64::from(self.scene.ao.secondary_radius),
             triangles: self.geometry.tracer.triangles().len(),
             resolution: self.view.resolution,
-            transect: (0..width).map(|x| f64::from(self.scene.measure.transect_at(x)) / radius).collect(),
+            transect: (0..self.view.resolution[0])
+                .map(|x| f64::from(self.scene.measure.transect_at(x)) / radius)
+                .collect(),
             regions: Region::ALL.into_iter().map(|r| (r, self.regions.pixels(r).len())).collect(),
             brighter,
             judge,
@@ -86,11 +97,11 @@ impl Set<'_> {
             no_judge,
             judge_error,
             occluders,
-            convergence: self.convergence(rendered, counts),
-            profiles,
-            image,
+            convergence: Vec::new(),
+            profiles: Vec::new(),
+            image: format!("images/{}/regions.exr", self.scene.name),
             look: look_image(&self.scene.name),
-        })
+        }
     }
 
     /// How each method converges on each renderer: over all pixels, and over the

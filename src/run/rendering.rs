@@ -6,19 +6,15 @@ use super::{
     journal::{self, Done, Journal},
     measuring::Counts,
     set::Set,
-    stop::Halt,
+    stop::{Clock, Halt},
     unit::{CONVERGED_REPLICATES, Unit},
 };
 use crate::{
     disk::DiskError,
-    judge_cache::{JudgeCache, Key},
     layers::{Layers, pixel_hash},
-    metrics::{
-        artifact::Converged,
-        judge::{JudgedRegions, Pair},
-    },
+    metrics::{artifact::Converged, judge::Pair},
     record::Timing,
-    render::{Geometry, Job, Loaded, RenderError, gbuffer::GBuffer, path},
+    render::{Loaded, RenderError},
     stats::mean_variance,
     suite::Case,
 };
@@ -27,17 +23,8 @@ use std::{
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{Mutex, PoisonError},
     thread,
-    time::{Duration, Instant},
+    time::Instant,
 };
-
-/// Added to the seed for images that must not share random numbers with the
-/// replicates they are compared with.
-const CONVERGED: u32 = 0x00c0_0000;
-const LOOK: u32 = 0x0001_0000;
-
-/// Added to the seed, so that the judge shares no random numbers with what it
-/// judges.
-const JUDGE: u32 = 0x0010_0000;
 
 /// The images of one case.
 #[derive(Clone, Debug)]
@@ -71,7 +58,12 @@ pub(super) struct Rendered {
     pub done: Vec<Done>,
     /// Why the judge's images could not be kept for other runs.
     pub cache_trouble: Option<String>,
+    /// The failure that ended the run.
+    pub ended: Option<String>,
 }
+
+/// Looks at what is rendered after each unit, and may say why the run is to end.
+pub(super) type Watch<'a> = &'a (dyn Fn(&Rendered) -> Option<String> + Sync);
 
 /// Images of a unit, as they were rendered.
 enum Product {
@@ -87,6 +79,8 @@ pub(super) struct Studio<'a> {
     pub means: &'a Means<'a>,
     pub journal: Journal<'a>,
     pub progress: &'a Progress<'a>,
+    /// When no replicates are added any more.
+    pub until: Option<Instant>,
 }
 
 impl Studio<'_> {
@@ -95,20 +89,31 @@ impl Studio<'_> {
     /// # Errors
     /// Where a file cannot be written. What a renderer gets wrong costs its unit alone.
     pub fn render(&self, units: &[Unit<'_>], replicates: u32, rendered: &mut Rendered) -> Result<(), DiskError> {
+        self.render_watched(units, replicates, rendered, &|_| None)
+    }
+
+    /// The same, watched.
+    pub fn render_watched(
+        &self,
+        units: &[Unit<'_>],
+        replicates: u32,
+        rendered: &mut Rendered,
+        watch: Watch<'_>,
+    ) -> Result<(), DiskError> {
         let (on_gpu, on_cpu): (Vec<&Unit<'_>>, Vec<&Unit<'_>>) = units.iter().partition(|u| u.is_on_gpu());
         let shared = Mutex::new((rendered, Ok(())));
         // Of this thread; the GPU's is opened by the thread that uses it.
         let cpu_lane = || {
             let mut loaded = None;
             let open = || self.means.cpu.load(&self.set.geometry);
-            self.lane(&on_cpu, replicates, &mut loaded, &open, &shared);
+            self.lane(&on_cpu, replicates, &mut loaded, &open, watch, &shared);
         };
         let gpu = self.means.gpu;
         let gpu_lane = || {
             let mut loaded = None;
             let none = || RenderError::NoAdapter("the plan asks for one".into());
             let open = || gpu.ok_or_else(none).and_then(|g| g.load(&self.set.geometry));
-            self.lane(&on_gpu, replicates, &mut loaded, &open, &shared);
+            self.lane(&on_gpu, replicates, &mut loaded, &open, watch, &shared);
         };
         if self.means.machine.gpu_is_software == Some(false) && !on_gpu.is_empty() && !on_cpu.is_empty() {
             self.side_by_side(cpu_lane, gpu_lane);
@@ -133,6 +138,7 @@ impl Studio<'_> {
         replicates: u32,
         loaded: &mut Option<Result<Box<dyn Loaded + 'l>, RenderError>>,
         open: &dyn Fn() -> Result<Box<dyn Loaded + 'l>, RenderError>,
+        watch: Watch<'_>,
         shared: &Mutex<(&mut Rendered, Result<(), DiskError>)>,
     ) {
         for unit in units {
@@ -160,6 +166,14 @@ impl Studio<'_> {
                 Ok(Some((product, done, trouble))) => {
                     guard.0.cache_trouble = guard.0.cache_trouble.take().or(trouble);
                     guard.0.take(unit, product, done, self.set.view.pixels());
+                    let so_far: &Rendered = guard.0;
+                    let failed = || self.failure(unit, &id, so_far).or_else(|| watch(so_far));
+                    let failed = if self.means.fail_fast { failed() } else { None };
+                    if let Some(why) = failed {
+                        guard.0.ended.get_or_insert(why);
+                        self.means.stop.ask();
+                        return;
+                    }
                 }
                 Ok(None) => return,
                 Err(e) => {
@@ -170,6 +184,15 @@ impl Studio<'_> {
             }
             self.progress.end(unit.cost(self.set.plan, self.set.pixels()));
         }
+    }
+
+    /// Why the images of a unit cannot be used.
+    fn failure(&self, unit: &Unit<'_>, id: &str, rendered: &Rendered) -> Option<String> {
+        let fault = match unit {
+            Unit::Converged(method) => rendered.truths.get(method).and_then(|t| t.fault.clone()),
+            _ => rendered.done.iter().find(|d| d.unit == id).and_then(|d| d.error.clone()),
+        };
+        fault.map(|why| format!("{id}: {why}"))
     }
 
     /// One unit, from the journal or rendered; None where the run ends before it is done.
@@ -201,18 +224,21 @@ impl Studio<'_> {
             }
         }
         let mut trouble = None;
+        let clock = Clock { stop: &self.means.stop, start, limit: self.means.case_timeout };
         let mut render = || -> Result<Product, Halt> {
             if self.means.is_merge {
                 return Err(Halt::Failed("no shard holds its images".into()));
             }
             if *unit == Unit::Judge {
-                return self.trace_judge(&mut trouble).map(|(pairs, cached)| Product::Judge(pairs, cached));
+                return self.trace_judge(&clock, &mut trouble).map(|(pairs, cached)| Product::Judge(pairs, cached));
             }
             let loaded = loaded.get_or_insert_with(open).as_mut().map_err(|e| Halt::Failed(e.to_string()))?;
             match unit {
-                Unit::Converged(method) => self.converged(*method, loaded.as_mut()).map(Product::Converged),
-                Unit::Case(case) => self.case(case, replicates, known.take(), loaded.as_mut()).map(Product::Case),
-                _ => self.look(loaded.as_mut()).map(Product::Look),
+                Unit::Converged(method) => self.converged(*method, loaded.as_mut(), &clock).map(Product::Converged),
+                Unit::Case(case) => {
+                    self.case(case, replicates, known.take(), loaded.as_mut(), &clock).map(Product::Case)
+                }
+                _ => self.look(loaded.as_mut(), &clock).map(Product::Look),
             }
         };
         let product = match catch_unwind(AssertUnwindSafe(&mut render)) {
@@ -238,6 +264,25 @@ impl Studio<'_> {
         }
         self.journal.note(&done)?;
         Ok(Some((product, done, trouble)))
+    }
+
+    /// Leaves no more images of a case than it is measured from: what an unfinished run had
+    /// rendered for a look that this one did not come to.
+    pub fn trim(&self, case: &Case, replicates: u32, rendered: &mut Rendered) -> Result<(), DiskError> {
+        let Some(Ok(images)) = rendered.images.get_mut(&case.id()) else { return Ok(()) };
+        if images.replicates.len() <= replicates as usize {
+            return Ok(());
+        }
+        images.replicates.truncate(replicates as usize);
+        images.hash = pixel_hash(&moments(&images.replicates, self.set.view.pixels()).0);
+        let (unit, images) = (Unit::Case(case), images.clone());
+        let path = self.journal.folder.path().join(journal::file(self.set.plan, &self.set.scene.name, &unit));
+        self.layers(&unit, &Product::Case(images)).write(&path)?;
+        for done in rendered.done.iter_mut().filter(|d| d.unit == case.id()) {
+            done.sha256 = Some(journal::sha256(&path)?);
+            self.journal.note(done)?;
+        }
+        Ok(())
     }
 
     /// The images of a unit as the file that they are kept in.
@@ -296,142 +341,6 @@ impl Studio<'_> {
             }
         })
     }
-
-    /// Traces the scene and its twin, adding replicates until every region mean
-    /// is as precise as the suite asks or the budget is spent. Replicates that an
-    /// earlier run traced are taken from the cache; the result is the same.
-    fn trace_judge(&self, trouble: &mut Option<String>) -> Result<(Vec<Pair>, usize), Halt> {
-        let set = self.set;
-        let Some(twin) = &set.twin else { return Ok((Vec::new(), 0)) };
-        let settings = &set.plan.suite.file.judge;
-        let seed = set.plan.seed.wrapping_add(JUDGE);
-        let paths = settings.paths.get();
-        let most = settings.max_replicates.get() as usize;
-        let key = Key { scene: &set.hash, paths, seed };
-        let load = |c: &JudgeCache| c.load(&key, set.view.resolution);
-        let mut pairs = self.means.cache.map_or_else(Vec::new, load);
-        let cached = pairs.len();
-        let mut used = 0;
-        let of = |geometry: &Geometry, r: usize| path::irradiance(geometry, &set.gbuffer, paths, seed, r as u32);
-        let mut stopped = false;
-        loop {
-            used = (used + settings.replicates.get() as usize).min(most);
-            while pairs.len() < used && !stopped {
-                let r = pairs.len();
-                pairs.push(Pair { with: of(&set.geometry, r), without: of(twin, r) });
-                stopped = self.means.stop.is_asked();
-            }
-            if stopped {
-                break;
-            }
-            super::faults::check_judge(&pairs[..used], &set.regions, set.view.resolution[0]).map_err(Halt::Failed)?;
-            // Where regions are too small for a judge, measuring says so.
-            let Ok(judge) = JudgedRegions::new(&pairs[..used], &set.regions) else { break };
-            if judge.widest() <= settings.precision || used >= most {
-                break;
-            }
-        }
-        if let Some(cache) = self.means.cache.filter(|_| pairs.len() > cached)
-            && let Err(e) = cache.store(&key, set.view.resolution, &pairs)
-        {
-            // That costs time, not the run.
-            *trouble = Some(e.to_string());
-        }
-        if stopped {
-            return Err(Halt::Stopped);
-        }
-        pairs.truncate(used);
-        Ok((pairs, cached.min(used)))
-    }
-
-    fn converged(&self, method: usize, loaded: &mut dyn Loaded) -> Result<Truth, Halt> {
-        let set = self.set;
-        let (mut replicates, mut fault) = (Vec::new(), None);
-        for replicate in 0..CONVERGED_REPLICATES {
-            let frame = loaded.render(&Job {
-                view: &set.view,
-                camera: set.camera(),
-                estimator: set.plan.suite.methods[method].estimator.unsmoothed(),
-                ao: set.scene.ao,
-                rays: set.plan.suite.file.converged_rays.get() / CONVERGED_REPLICATES,
-                seed: set.plan.seed.wrapping_add(CONVERGED),
-                replicate,
-            });
-            let frame = frame.map_err(|e| Halt::Failed(e.to_string()))?;
-            let checked = super::faults::check_frame(&frame, set.regions(method), replicate);
-            fault = fault.or_else(|| checked.err().map(|e| e.to_string()));
-            replicates.push(frame.values);
-            self.may_go_on()?;
-        }
-        Ok(Truth { converged: Converged::new(replicates), fault })
-    }
-
-    fn case(
-        &self,
-        case: &Case,
-        replicates: u32,
-        known: Option<Images>,
-        loaded: &mut dyn Loaded,
-    ) -> Result<Images, Halt> {
-        let set = self.set;
-        let method = set.method(case);
-        let start = Instant::now();
-        let (mut images, mut seconds) = known.map_or_else(|| (Vec::new(), 0.0), |i| (i.replicates, i.seconds));
-        for replicate in images.len() as u32..replicates {
-            self.may_go_on()?;
-            if let Some(limit) = self.means.case_timeout
-                && start.elapsed() > limit
-            {
-                return Err(Halt::Failed(too_long(limit, replicate, replicates)));
-            }
-            let job = Job {
-                view: &set.view,
-                camera: set.camera(),
-                estimator: set.plan.suite.methods[method].estimator,
-                ao: set.scene.ao,
-                rays: case.rays,
-                seed: set.plan.seed,
-                replicate,
-            };
-            let failed = |e: RenderError| Halt::Failed(e.to_string());
-            let frame = loaded.render(&job).map_err(failed)?;
-            super::faults::check_frame(&frame, set.regions(method), replicate).map_err(failed)?;
-            images.push(frame.values);
-            seconds += frame.seconds;
-        }
-        let hash = pixel_hash(&moments(&images, set.view.pixels()).0);
-        Ok(Images { replicates: images, hash, seconds })
-    }
-
-    /// Pictures from the look view: every method, and the path tracer.
-    fn look(&self, cpu: &mut dyn Loaded) -> Result<Layers, Halt> {
-        let set = self.set;
-        let view = set.scene.look.view();
-        let rays = set.plan.suite.file.look_rays.get();
-        let seed = set.plan.seed.wrapping_add(LOOK);
-        let mut layers = Layers::new(view.resolution);
-        for method in set.plan.methods() {
-            let method = &set.plan.suite.methods[method];
-            let job = Job {
-                view: &view,
-                camera: None,
-                estimator: method.estimator,
-                ao: set.scene.ao,
-                rays,
-                seed,
-                replicate: 0,
-            };
-            let frame = cpu.render(&job).map_err(|e| Halt::Failed(e.to_string()))?;
-            layers = layers.with(&format!("openness-{}", method.name), frame.values);
-            self.may_go_on()?;
-        }
-        let gbuffer = GBuffer::new(&set.geometry.tracer, &view);
-        Ok(layers.with("path-traced", path::irradiance(&set.geometry, &gbuffer, rays, seed, 0)))
-    }
-
-    fn may_go_on(&self) -> Result<(), Halt> {
-        if self.means.stop.is_asked() { Err(Halt::Stopped) } else { Ok(()) }
-    }
 }
 
 impl Rendered {
@@ -477,20 +386,13 @@ impl Rendered {
 }
 
 /// Mean and variance of each pixel.
-fn moments(replicates: &[Vec<f32>], pixels: usize) -> (Vec<f32>, Vec<f32>) {
+pub(super) fn moments(replicates: &[Vec<f32>], pixels: usize) -> (Vec<f32>, Vec<f32>) {
     let of = |pixel: usize| {
         let values: Vec<f64> = replicates.iter().map(|r| f64::from(r[pixel])).collect();
         let (mean, variance) = mean_variance(&values);
         (mean as f32, variance as f32)
     };
     (0..pixels).map(of).unzip()
-}
-
-fn too_long(limit: Duration, done: u32, of: u32) -> String {
-    format!(
-        "it took longer than {} s (--case-timeout): {done} of {of} replicates were done by then",
-        limit.as_secs_f64()
-    )
 }
 
 /// What a panic said.

@@ -1,7 +1,7 @@
 //! A part of a run, on a machine of its own.
 
 use super::{
-    Means, Prepared, RunError,
+    BUILD, Means, Prepared, RunError, at_first_failure,
     journal::{Done, Journal},
     mine,
     progress::Progress,
@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     disk::{DiskError, read_text, write_whole},
-    record::{Machine, RecordFolder, SHARD},
+    record::{Budget, Machine, RecordFolder, SHARD, Undecided},
     suite::Platform,
 };
 use schemars::JsonSchema;
@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use std::{fmt, io::Write, path::Path, str::FromStr, time::Instant};
 
 /// Version of the format of `shard.json`.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Shards of one run, at most.
 const MOST: u32 = 65_536;
@@ -124,6 +124,8 @@ pub struct ShardRecord {
     pub version: u32,
     /// Version of the tool that wrote it.
     pub tool: String,
+    /// What that is built from, hashed.
+    pub build: String,
     /// Which part.
     pub shard: Shard,
     /// What decides which images come of the run, hashed: equal in all its shards.
@@ -137,8 +139,13 @@ pub struct ShardRecord {
     /// What the names of cases had to contain.
     pub filter: Option<String>,
     /// The most replicates of a run that goes on until it is sure.
-    #[serde(default)]
     pub until_sure: Option<u32>,
+    /// Then: after so many seconds no replicates were added.
+    pub max_time: Option<f64>,
+    /// Then: what is read of the base record, hashed, where a gate is against it.
+    pub base: Option<String>,
+    /// Then: what `max_time` ended.
+    pub ended: Vec<Undecided>,
     /// Where it ran.
     pub machine: Machine,
     /// When it began, UTC.
@@ -199,26 +206,29 @@ impl Prepared<'_> {
         let timing = timing();
         let progress = Progress::new(observer, self.cost(Some(shard)));
         let journal = Journal { folder };
-        let mut units = Vec::new();
+        let until = means.max_time.and_then(|t| start.checked_add(t));
+        let (mut units, mut ended, mut early, mut stopped) = (Vec::new(), Vec::new(), None, false);
         for set in &self.sets {
-            let studio = Studio { set, means, journal, progress: &progress };
+            let studio = Studio { set, means, journal, progress: &progress, until };
             let mut rendered = Rendered::default();
             let own = mine(set, Some(shard));
             match self.plan.until_sure {
-                Some(_) if !own.is_empty() => drop(studio.scene(&mut rendered)?),
+                Some(_) if !own.is_empty() => {
+                    let counts = studio.scene(&mut rendered)?;
+                    stopped |= counts.stopped;
+                    ended.extend(counts.undecided.into_iter().filter(|u| u.by == Budget::MaxTime));
+                }
                 _ => studio.render(&own, self.plan.suite.file.replicates.get(), &mut rendered)?,
             }
-            let failed = rendered.done.iter().any(|d| d.error.is_some());
+            early = early.or(rendered.ended.as_deref().map(at_first_failure));
             units.extend(rendered.done);
-            if failed && means.fail_fast {
-                means.stop.ask();
-            }
         }
         units.sort_by(|a, b| a.unit.cmp(&b.unit));
         let missing = self.steps(Some(shard)).len() - units.len();
         let record = ShardRecord {
             version: VERSION,
             tool: env!("CARGO_PKG_VERSION").to_owned(),
+            build: BUILD.to_owned(),
             shard,
             identity: self.identity(&means.machine),
             suite: suite.to_owned(),
@@ -226,12 +236,21 @@ impl Prepared<'_> {
             platform: self.plan.platform,
             filter: self.plan.filter.clone(),
             until_sure: self.plan.until_sure,
+            max_time: means.max_time.map(|t| t.as_secs_f64()),
+            base: self.base(),
+            ended,
             machine: means.machine.clone(),
             began: timing.began,
             seconds: start.elapsed().as_secs_f64(),
             threads: timing.threads,
             units,
-            incomplete: (missing > 0).then(|| format!("it ended early: {missing} units are not rendered")),
+            incomplete: (missing > 0 || stopped).then(|| {
+                let what = match missing {
+                    0 => "not all replicates that it asks for are rendered".to_owned(),
+                    _ => format!("{missing} units are not rendered"),
+                };
+                format!("{}: {what}", early.as_deref().unwrap_or("it ended early"))
+            }),
         };
         let path = folder.path().join(SHARD);
         let text = serde_json::to_string_pretty(&record)

@@ -9,7 +9,13 @@ use std::path::Path;
 
 /// Prints every unit with its cost, and how long all may take by what the record that
 /// lies where this one would go tells of the like.
-pub(super) fn tell_plan(prepared: &Prepared<'_>, shard: Option<Shard>, out: &Path) -> Result<Exit, Failure> {
+/// With `until_sure`, replicates of the suite and the most of a case, it says what that means.
+pub(super) fn tell_plan(
+    prepared: &Prepared<'_>,
+    shard: Option<Shard>,
+    out: &Path,
+    until_sure: Option<[u32; 2]>,
+) -> Result<Exit, Failure> {
     let steps = prepared.steps(shard);
     let earlier = Record::read(out).ok();
     let known = |unit: &str| {
@@ -35,5 +41,12 @@ pub(super) fn tell_plan(prepared: &Prepared<'_>, shard: Option<Shard>, out: &Pat
         format!("; how long is not known: there is no record in {} to tell", out.display())
     };
     tell(&format!("{} units, {:.1} million rays{time}; nothing is rendered", steps.len(), total as f64 / 1e6));
-    Ok(if steps.is_empty() { Exit::Nothing } else { Exit::Pass })
+    if let Some([usual, most]) = until_sure {
+        tell(&format!(
+            "with --until-sure this is no bound: it counts {usual} replicates a case, and a case takes {} to {most}",
+            most.min(4)
+        ));
+    }
+    // A shard may be empty, and is a shard all the same.
+    Ok(if steps.is_empty() && shard.is_none() { Exit::Nothing } else { Exit::Pass })
 }

@@ -5,8 +5,8 @@ use crate::{
     run::Stop,
 };
 
-/// The first one ends the run after the image it is at; the second ends it at once. What is
-/// done is kept either way.
+/// The first one ends the run in good order, the second at once. What is done is kept either
+/// way.
 pub(super) fn listen(stop: &Stop) {
     let stop = stop.clone();
     let handler = move || {
@@ -14,7 +14,7 @@ pub(super) fn listen(stop: &Stop) {
             std::process::exit(Exit::Incomplete as i32);
         }
         stop.ask();
-        tell("aogauge: ending after this image; press Ctrl-C again to end at once");
+        tell("aogauge: ending; press Ctrl-C again to end at once");
     };
     // Also where Ctrl-C was ignored: scripts start programs in the background that way, and
     // must be able to end them. In one process only the first run can listen; without it

@@ -7,6 +7,7 @@ use super::{
     ao::{Decisions, Shading},
     gbuffer::{GBuffer, Surface},
     indirect, path,
+    patience::Patience,
     sampler::Sampler,
     screen_space::Screen,
     smoothing::Smoothing,
@@ -37,6 +38,19 @@ impl Renderer for Cpu {
 
 impl Loaded for LoadedCpu<'_> {
     fn render(&mut self, job: &Job<'_>) -> Result<Frame, RenderError> {
+        self.frame(job, &Patience::new(&|| true))
+    }
+
+    fn render_while(&mut self, job: &Job<'_>, go_on: &(dyn Fn() -> bool + Sync)) -> Result<Option<Frame>, RenderError> {
+        let patience = Patience::new(go_on);
+        let frame = self.frame(job, &patience)?;
+        Ok((!patience.is_over()).then_some(frame))
+    }
+}
+
+impl LoadedCpu<'_> {
+    /// The image; whatever it holds where patience is over.
+    fn frame(&mut self, job: &Job<'_>, patience: &Patience<'_>) -> Result<Frame, RenderError> {
         self.geometry.suits(&job.estimator, job.ao)?;
         let tracer = &self.geometry.tracer;
         let gbuffer = match &self.seen {
@@ -46,7 +60,7 @@ impl Loaded for LoadedCpu<'_> {
         if let Estimator::Openness(method) = &job.estimator
             && method.smoothing != Smoothing::NONE
         {
-            return smoothed::smoothed(tracer, gbuffer, job, method);
+            return smoothed::smoothed(tracer, gbuffer, job, method, patience);
         }
         let screen = match &job.estimator {
             Estimator::ScreenSpace(_) => Some(Screen::again(&mut self.screen, tracer, gbuffer, job)?),
@@ -54,14 +68,16 @@ impl Loaded for LoadedCpu<'_> {
         };
         let start = Instant::now();
         let image = match &job.estimator {
-            Estimator::Openness(method) => openness(tracer, gbuffer, job, *method),
-            Estimator::LocalIndirect(method) => Image::colored(shade(gbuffer, [f32::NAN; 3], |pixel, surface| {
-                let sampler = Sampler::new(job.seed, pixel, job.replicate);
-                indirect::incident(self.geometry, surface, job.ao, method, job.rays, &sampler)
-            })),
+            Estimator::Openness(method) => openness(tracer, gbuffer, job, *method, patience),
+            Estimator::LocalIndirect(method) => {
+                Image::colored(shade(gbuffer, patience, [f32::NAN; 3], |pixel, surface| {
+                    let sampler = Sampler::new(job.seed, pixel, job.replicate);
+                    indirect::incident(self.geometry, surface, job.ao, method, job.rays, &sampler)
+                }))
+            }
             Estimator::ScreenSpace(method) => Image::plain(screen.map_or_else(Vec::new, |s| s.openness(job, method))),
             Estimator::PathTraced => {
-                Image::colored(path::colors(self.geometry, gbuffer, job.rays, job.seed, job.replicate))
+                Image::colored(path::traced(self.geometry, gbuffer, [job.rays, job.seed, job.replicate], patience))
             }
         };
         Ok(Frame {
@@ -92,8 +108,8 @@ impl Image {
     }
 }
 
-fn openness(tracer: &Tracer, gbuffer: &GBuffer, job: &Job<'_>, method: Openness) -> Image {
-    let (values, decisions) = shade(gbuffer, (f32::NAN, Decisions::default()), |pixel, surface| {
+fn openness(tracer: &Tracer, gbuffer: &GBuffer, job: &Job<'_>, method: Openness, patience: &Patience<'_>) -> Image {
+    let (values, decisions) = shade(gbuffer, patience, (f32::NAN, Decisions::default()), |pixel, surface| {
         let shading = Shading::new(tracer, surface.point, surface.normal, job.ao, method);
         shading.openness(job.rays, &Sampler::new(job.seed, pixel, job.replicate))
     })
@@ -102,8 +118,18 @@ fn openness(tracer: &Tracer, gbuffer: &GBuffer, job: &Job<'_>, method: Openness)
     Image { values, colors: None, decisions: Some(decisions) }
 }
 
-/// A value for each pixel that sees a surface, `none` for the others.
-fn shade<T: Copy + Send + Sync>(gbuffer: &GBuffer, none: T, value: impl Fn(u32, &Surface) -> T + Sync) -> Vec<T> {
+/// A value for each pixel that sees a surface, `none` for the others and where patience
+/// is over.
+fn shade<T: Copy + Send + Sync>(
+    gbuffer: &GBuffer,
+    patience: &Patience<'_>,
+    none: T,
+    value: impl Fn(u32, &Surface) -> T + Sync,
+) -> Vec<T> {
     let surfaces = gbuffer.surfaces.par_iter().enumerate().with_min_len(64);
-    surfaces.map(|(pixel, surface)| surface.as_ref().map_or(none, |s| value(pixel as u32, s))).collect()
+    let one = |(pixel, surface): (usize, &Option<Surface>)| {
+        let skipped = patience.skips(pixel);
+        surface.as_ref().filter(|_| !skipped).map_or(none, |s| value(pixel as u32, s))
+    };
+    surfaces.map(one).collect()
 }

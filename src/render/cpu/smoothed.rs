@@ -5,6 +5,7 @@ use crate::{
     render::{
         Frame, Job, Openness, RenderError,
         gbuffer::GBuffer,
+        patience::Patience,
         smoothing::{Camera, Shot, Smoothing, Temporal, atrous, temporal},
     },
     trace::Tracer,
@@ -20,6 +21,7 @@ pub(super) fn smoothed(
     last: &GBuffer,
     job: &Job<'_>,
     method: &Openness,
+    patience: &Patience<'_>,
 ) -> Result<Frame, RenderError> {
     let Smoothing { temporal, denoise } = method.smoothing;
     let motion = temporal.unwrap_or_default();
@@ -32,7 +34,7 @@ pub(super) fn smoothed(
         let seen = if view == *job.view { Cow::Borrowed(last) } else { Cow::Owned(GBuffer::new(tracer, &view)) };
         let frame = Job { view: &view, seed: Temporal::seed(job.seed, age), ..*job };
         let start = Instant::now();
-        let raw = openness(tracer, &seen, &frame, by_rays).values;
+        let raw = openness(tracer, &seen, &frame, by_rays, patience).values;
         let before = past.as_ref().map(|(camera, gbuffer, history)| (Shot { camera: *camera, gbuffer }, history));
         let history = temporal::accumulate(motion.blend, Shot { camera, gbuffer: &seen }, &raw, before);
         time += start.elapsed();
