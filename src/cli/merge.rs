@@ -30,6 +30,9 @@ pub struct Args {
     /// The folder of an earlier record, for gates `against = "base"`.
     #[arg(long, value_name = "DIR")]
     base: Option<PathBuf>,
+    /// There is no earlier record yet: gates against it are left out.
+    #[arg(long, conflicts_with = "base")]
+    no_base: bool,
     /// What is printed on standard output: nothing, or the record.
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -52,6 +55,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
         plan = plan.only(filter);
     }
     plan.base = base(args.base.as_deref(), &suite)?;
+    plan.no_base = args.no_base;
     let prepared = Prepared::new(&plan)?;
     let folder = RecordFolder::create(&args.out)?;
     let record = shards.merge(&prepared, &folder, &bar())?;

@@ -43,6 +43,10 @@ pub struct Args {
     /// it to merge.
     #[arg(long, value_name = "DIR", conflicts_with = "shard")]
     base: Option<PathBuf>,
+    /// There is no earlier record yet: gates against it are left out. Without this and without
+    /// --base they are inconclusive.
+    #[arg(long, conflicts_with = "base")]
+    no_base: bool,
     /// Who renders.
     #[arg(long, value_enum, default_value_t)]
     renderer: Choice,
@@ -175,6 +179,7 @@ fn prepare(
     };
     let mut plan = Plan::new(suite, platform, args.seed);
     plan.base = base(args.base.as_deref(), suite)?;
+    plan.no_base = args.no_base;
     let most = args.max_replicates.unwrap_or_else(|| suite.file.replicates.get().saturating_mul(4).min(1024));
     plan.until_sure = args.until_sure.then_some(most);
     if let Some(filter) = &args.filter {
@@ -245,7 +250,11 @@ pub(super) fn finish(record: &Record, folder: &RecordFolder, format: Format) -> 
         record.summary_line(),
         folder.path().join(report::FILE).display(),
         match exit(record) {
-            Exit::Pass if record.verdicts.is_empty() => "rendered; the suite has no gates",
+            Exit::Pass if record.verdicts.is_empty() && record.idle_gates.is_empty() => {
+                "rendered; the suite has no gates"
+            }
+            Exit::Pass if record.verdicts.is_empty() => "rendered; the gates wait for a base record (--no-base)",
+            Exit::Nothing => "nothing was judged: the suite has gates, and none of them was held against anything",
             Exit::Pass => "pass",
             _ => "not a pass",
         },
@@ -312,6 +321,8 @@ fn exit(record: &Record) -> Exit {
         Exit::Failed
     } else if s.inconclusive > 0 {
         Exit::Inconclusive
+    } else if record.has_judged_nothing() {
+        Exit::Nothing
     } else {
         Exit::Pass
     }
@@ -354,6 +365,7 @@ within = 0.001
             out: dir.path().join("out"),
             seed: None,
             base: None,
+            no_base: false,
             renderer: Choice::Gpu,
             threads: None,
             filter: None,

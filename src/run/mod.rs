@@ -207,6 +207,7 @@ impl<'a> Prepared<'a> {
             scenes: &scenes,
             cases: &cases,
             base: plan.base.as_ref(),
+            no_base: plan.no_base,
         };
         let (verdicts, idle_gates) = judge(&evidence);
         Record {
@@ -216,6 +217,7 @@ impl<'a> Prepared<'a> {
             machine,
             filter: plan.filter.clone(),
             incomplete,
+            no_base: plan.no_base,
             summary: Summary::new(&verdicts, &idle_gates, &scenes, &cases),
             pooled: pooled(&suite, &scenes, &cases),
             verdicts,

@@ -94,12 +94,13 @@ impl Studio<'_> {
             scenes: &[],
             cases,
             base: plan.base.as_ref(),
+            no_base: plan.no_base,
         };
         let (verdicts, _) = judge(&evidence);
         let open = verdicts.iter().filter_map(|v| {
             let p = [v.p_holds?.raw, v.p_broken?.raw];
             let sure = decided(p, family, v.spent, 1.0 - v.confidence);
-            v.case.as_ref().filter(|_| !sure).map(|c| block(plan, c))
+            v.case.as_ref().filter(|_| !sure && v.can_be_decided(family)).map(|c| block(plan, c))
         });
         open.collect()
     }
