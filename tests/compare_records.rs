@@ -497,7 +497,10 @@ fn a_gate_that_is_another_one_is_told_option_by_option() {
     assert_eq!((&change["metric"], &change["value"]["base"]), (&json!("mae over left"), &Value::Null));
     assert!(change["value"]["new"].is_f64() && change["edited"][0] == "limit at least 0.1 → at least 0.2", "{change}");
     let comment = markdown(1, &RUNS.out[0], &new);
-    assert!(comment.contains("the gate itself changed: limit at least 0.1 → at least 0.2, metric openness → mae"), "{comment}");
+    assert!(
+        comment.contains("the gate itself changed: limit at least 0.1 → at least 0.2, metric openness → mae"),
+        "{comment}"
+    );
     assert!(comment.contains("| other confidence | not black | 0.95 | 0.99 |"), "{comment}");
     // The same gates are told of by no word.
     assert_eq!(found(0, &new, &new, &[])["gates"]["edits"], json!([]));

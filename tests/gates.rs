@@ -293,7 +293,8 @@ fn a_run_that_judges_nothing_is_not_green() {
 fn the_noise_of_a_base_is_not_promised_away() {
     let dir = tempfile::tempdir().unwrap();
     let [suite, base, now] = ["s.toml", "base", "now"].map(|n| dir.path().join(n));
-    let head = SUITE.split("[[gate]]").next().unwrap().replace("replicates = 4\nconverged", "replicates = 8\nconverged");
+    let head =
+        SUITE.split("[[gate]]").next().unwrap().replace("replicates = 4\nconverged", "replicates = 8\nconverged");
     let gate = "[[gate]]\nname = \"g\"\nmetric = \"contrast-error\"\nagainst = \"base\"\nmax = 0.02\n";
     fs::write(&suite, format!("{head}{gate}")).unwrap();
     assert_eq!(run(&suite, &base, &["--no-base"]).0, 0);

@@ -179,7 +179,9 @@ fn gates(changes: &Changes) -> Table {
     let on = |n, o| format!("{} on {}", outcome(o), counted(n, "case", "cases"));
     let mut rows: Vec<Vec<Cell>> =
         gates.limits.iter().map(|l| row("other limit", &l.gate, l.base.clone(), l.new.clone())).collect();
-    rows.extend(gates.edits.iter().map(|e| row(&format!("other {}", e.option), &e.gate, e.base.clone(), e.new.clone())));
+    rows.extend(
+        gates.edits.iter().map(|e| row(&format!("other {}", e.option), &e.gate, e.base.clone(), e.new.clone())),
+    );
     rows.extend(gates.gone.iter().map(|g| match &g.idle {
         Some(why) => row("not run", &g.gate, on(g.cases, g.outcome), why.clone()),
         None => row("gone", &g.gate, on(g.cases, g.outcome), "–".to_owned()),

@@ -185,7 +185,11 @@ mod tests {
         let n = v.replicates_needed(1).unwrap();
         let there = Estimate { value: 0.51, se: 0.01 / n.sqrt(), df: 15.0 * n };
         assert!((LIMIT.detectable(&there, 0.05).unwrap() - 0.01).abs() < 1e-9, "{n}");
-        assert!(text(&v).contains("more replicates would decide") && text(&v).contains("about 7.9 times"), "{}", text(&v));
+        assert!(
+            text(&v).contains("more replicates would decide") && text(&v).contains("about 7.9 times"),
+            "{}",
+            text(&v)
+        );
         // Half of the variance stays: the other half must fall further.
         let v = verdict(LIMIT, 0.512, 0.01, 0.01 * 0.1f64.sqrt());
         let with = v.replicates_needed(1).unwrap();

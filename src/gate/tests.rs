@@ -76,16 +76,15 @@ pub(super) fn record(suite: SuiteInfo, scenes: Vec<SceneRecord>, cases: Vec<Case
 
 /// Verdicts in the order of gates and cases.
 pub(super) fn judged(gates: Vec<Gate>, cases: &[CaseRecord], base: Option<&Record>) -> (Vec<Verdict>, Vec<IdleGate>) {
-    let evidence =
-        Evidence {
-            suite: &suite(gates),
-            gpu: "no adapter",
-            filter: None,
-            scenes: &[scene("s")],
-            cases,
-            base,
-            no_base: false,
-        };
+    let evidence = Evidence {
+        suite: &suite(gates),
+        gpu: "no adapter",
+        filter: None,
+        scenes: &[scene("s")],
+        cases,
+        base,
+        no_base: false,
+    };
     let (mut verdicts, idle) = judge(&evidence);
     let key = |v: &Verdict| (v.gate.clone(), cases.iter().position(|c| Some(&c.case) == v.case.as_ref()));
     verdicts.sort_by_key(key);
@@ -333,7 +332,8 @@ fn a_metric_is_held_against_the_base_record() {
     let (verdicts, idle) = judged(vec![against.clone()], &now, None);
     assert!(verdicts.is_empty() && !idle[0].excused && idle[0].reason.contains("give --base DIR, or --no-base"));
     let suite_of = suite(vec![against.clone()]);
-    let none = Evidence { no_base: true, ..Evidence::from(&record(suite_of.clone(), vec![scene("s")], now.to_vec())) };
+    let alone = record(suite_of.clone(), vec![scene("s")], now.to_vec());
+    let none = Evidence { no_base: true, ..Evidence::from(&alone) };
     let (verdicts, idle) = judge(&none);
     assert!(verdicts.is_empty() && idle[0].excused && idle[0].reason.contains("(--no-base)"));
 
@@ -390,7 +390,15 @@ fn gates_that_nothing_was_held_against_are_told() {
     // Whoever asked for some cases only does not get the others.
     let some = |gate: Gate| {
         let suite = suite(vec![gate]);
-        let all = Evidence { suite: &suite, gpu: "", filter: Some("s/e"), scenes: &[scene("s")], cases: &cpu, base: None, no_base: false };
+        let all = Evidence {
+            suite: &suite,
+            gpu: "",
+            filter: Some("s/e"),
+            scenes: &[scene("s")],
+            cases: &cpu,
+            base: None,
+            no_base: false,
+        };
         judge(&all)
     };
     let (verdicts, idle) = some(Gate { rays: vec![8], ..gate(Limit::AtLeast(0.5)) });

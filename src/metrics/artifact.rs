@@ -118,10 +118,9 @@ impl Method<'_> {
     /// 1 - max(0, dK) / dK(classic). The two methods share their seeds, so
     /// replicates are paired.
     pub fn removed(&self, classic: &Method<'_>, judge: Result<&JudgedRegions, Absent>) -> Metric {
-        let (estimate, of_judge) = judge.and_then(|judge| self.removed_estimates(classic, judge)).map_or_else(
-            |absent| (Err(absent), None),
-            |[estimate, of_judge]| (Ok(estimate), Some(of_judge)),
-        );
+        let (estimate, of_judge) = judge
+            .and_then(|judge| self.removed_estimates(classic, judge))
+            .map_or_else(|absent| (Err(absent), None), |[estimate, of_judge]| (Ok(estimate), Some(of_judge)));
         Metric::new(MetricName::Removed, None, estimate).with_floor(of_judge)
     }
 

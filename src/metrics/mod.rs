@@ -109,7 +109,15 @@ impl Metric {
         match estimate {
             Ok(e) if e.value.is_finite() => {
                 let finite = |v: f64| v.is_finite().then_some(v);
-                Metric { name, region, value: Some(e.value), se: finite(e.se), df: finite(e.df), floor: None, note: None }
+                Metric {
+                    name,
+                    region,
+                    value: Some(e.value),
+                    se: finite(e.se),
+                    df: finite(e.df),
+                    floor: None,
+                    note: None,
+                }
             }
             Ok(_) => Self::absent(
                 name,
