@@ -72,6 +72,9 @@ pub struct Record {
     /// Why the run ended early; absent where it did not.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub incomplete: Option<String>,
+    /// Whether it was run without a base record on purpose (`--no-base`).
+    #[serde(skip_serializing_if = "std::ops::Not::not", default)]
+    pub no_base: bool,
     /// What the run came to.
     pub summary: Summary,
     /// Failures first, then in the order of gates and cases.
@@ -166,6 +169,9 @@ pub struct Summary {
     /// Verdicts whose limit holds while the stricter one that warns is broken.
     #[serde(default)]
     pub warnings: usize,
+    /// Gates that nothing was held against, with an excuse.
+    #[serde(default)]
+    pub not_run: usize,
     /// Cases rendered.
     pub cases: usize,
     /// Cases that ended with an error.
@@ -184,6 +190,7 @@ impl Summary {
             inconclusive: count(Outcome::Inconclusive) + idle.iter().filter(|g| !g.excused).count(),
             known_failures: count(Outcome::KnownFailure),
             warnings: count(Outcome::Warn),
+            not_run: idle.iter().filter(|g| g.excused).count(),
             cases: cases.len(),
             failed_cases: cases.iter().filter(|c| c.error.is_some()).count(),
             failed_judges: scenes.iter().filter(|s| s.judge_error.is_some()).count(),
@@ -200,8 +207,9 @@ pub struct IdleGate {
     /// Why.
     pub reason: String,
     /// Whether that is no fault of the run: there was no GPU for a gate on the
-    /// GPU, or no base record for a gate against it. A gate that is idle without excuse
-    /// is inconclusive.
+    /// GPU, no base record for a gate against it and that on purpose, or no case that was asked for.
+    /// A gate that is idle without excuse is inconclusive. Where all gates are idle, excuses do not
+    /// help: see [`Record::has_judged_nothing`].
     pub excused: bool,
 }
 
@@ -483,6 +491,16 @@ impl Record {
         case.replicates.unwrap_or(self.suite.replicates)
     }
 
+    /// Whether the suite has gates and not one of them was held against anything, each
+    /// with an excuse: what such a run shows is not that all is well. That there is no base record, on
+    /// purpose, is excuse enough where all gates need one.
+    pub fn has_judged_nothing(&self) -> bool {
+        let needs_base = |name: &str| self.suite.gates.iter().any(|g| g.name == name && g.is_against_base());
+        let is_first = self.no_base && self.idle_gates.iter().all(|g| needs_base(&g.gate));
+        let all_excused = !self.idle_gates.is_empty() && self.idle_gates.iter().all(|g| g.excused);
+        self.verdicts.is_empty() && all_excused && !is_first
+    }
+
     /// Text for people: `5 passed, 1 failed, ...`.
     pub fn summary_line(&self) -> String {
         let s = &self.summary;
@@ -492,6 +510,9 @@ impl Record {
         }
         if s.warnings > 0 {
             line += &format!(", {} warnings", s.warnings);
+        }
+        if s.not_run > 0 {
+            line += &format!(", {} not run", s.not_run);
         }
         if s.failed_cases > 0 {
             line += &format!("; {} of {} cases ended with an error", s.failed_cases, s.cases);

@@ -437,6 +437,96 @@ fn cases_limits_and_times_are_told() {
     assert_eq!(found(0, one, two, &[])["cases"]["compared"], json!(4));
 }
 
+/// A warning is told and passes, here as in a run.
+#[test]
+fn a_pass_that_warns_now_is_told_and_passes() {
+    let new = edited("warns", |r| {
+        r["suite"]["gates"][0]["warn"] = json!({ "at-least": 0.9 });
+        let verdict = &mut items(r, "verdicts")[0];
+        assert_eq!(verdict["gate"], "not black");
+        (verdict["outcome"], verdict["warn"]) = (json!("warn"), json!({ "at-least": 0.9 }));
+        verdict["reason"] = json!("the limit holds, but the one that warns, at least 0.9, is broken");
+        r["summary"]["warnings"] = json!(1);
+    });
+    let all = found(0, &RUNS.out[0], &new, &[]);
+    let change = &all["verdicts"][0];
+    assert_eq!((&all["outcome"], &change["turn"], &change["new"]), (&json!("pass"), &json!("changed"), &json!("warn")));
+    assert_eq!((&change["limit"], &change["warn"]), (&json!("at least 0.1"), &json!("at least 0.9")));
+    let comment = markdown(0, &RUNS.out[0], &new);
+    for says in [
+        "### ⚠️ CHECK · tiny: no verdict got worse, 1 warns that did not",
+        "| PASS → WARN | not black |",
+        "openness over all at least 0.1, and warns unless at least 0.9; the gate itself changed: warn none → at least 0.9 |",
+        "| other warn | not black | none | at least 0.9 |",
+    ] {
+        assert!(comment.contains(says), "{says}: {comment}");
+    }
+    let back = found(0, &new, &RUNS.out[0], &[]);
+    assert_eq!((&back["verdicts"][0]["turn"], &back["verdicts"][0]["base"]), (&json!("better"), &json!("warn")));
+}
+
+#[test]
+fn a_gate_that_is_another_one_is_told_option_by_option() {
+    let new = edited("gates", |r| {
+        let gate = &mut r["suite"]["gates"][0];
+        (gate["metric"], gate["region"]) = (json!("mae"), json!("left"));
+        (gate["confidence"], gate["against"]) = (json!(0.99), json!("base"));
+        (gate["scenes"], gate["rays"]) = (json!(["scene", "plane"]), json!([4]));
+        (gate["estimators"], gate["renderers"]) = (json!(["extended"]), json!(["cpu"]));
+        gate["known_failure"] = json!("Because.");
+        for v in items(r, "verdicts").iter_mut().filter(|v| v["gate"] == "not black") {
+            (v["metric"]["name"], v["metric"]["region"], v["outcome"]) = (json!("mae"), json!("left"), json!("fail"));
+            v["limit"] = json!({ "at-least": 0.2 });
+        }
+    });
+    let all = found(1, &RUNS.out[0], &new, &[]);
+    let edits = &all["gates"]["edits"];
+    assert!(strings(edits, "gate").iter().all(|g| *g == "not black"), "{edits}");
+    let told: Vec<String> = ["option", "base", "new"].map(|f| strings(edits, f).join("; ")).to_vec();
+    assert_eq!(
+        told,
+        [
+            "metric; region; against; confidence; scenes; estimators; renderers; rays; known_failure",
+            "openness; all; none; 0.95; all; all; all; all; none",
+            "mae; left; base; 0.99; scene, plane; extended; cpu; 4; Because.",
+        ]
+    );
+    assert_eq!(all["gates"]["limits"][0]["new"], "at least 0.2");
+    let change = &all["verdicts"][0];
+    // What was measured then is no base of what is measured now.
+    assert_eq!((&change["metric"], &change["value"]["base"]), (&json!("mae over left"), &Value::Null));
+    assert!(change["value"]["new"].is_f64() && change["edited"][0] == "limit at least 0.1 → at least 0.2", "{change}");
+    let comment = markdown(1, &RUNS.out[0], &new);
+    assert!(
+        comment.contains("the gate itself changed: limit at least 0.1 → at least 0.2, metric openness → mae"),
+        "{comment}"
+    );
+    assert!(comment.contains("| other confidence | not black | 0.95 | 0.99 |"), "{comment}");
+    // The same gates are told of by no word.
+    assert_eq!(found(0, &new, &new, &[])["gates"]["edits"], json!([]));
+    let [text, _] = compare(0, &RUNS.out[0], &RUNS.out[1], &[]);
+    assert!(!text.contains("Gates:") && !text.contains("itself changed"), "{text}");
+}
+
+/// A broken run of the base branch must not redden what mends it.
+#[test]
+fn a_base_whose_cases_all_failed_is_nothing_to_compare_with_and_no_fault() {
+    let broken = edited("all-failed", |r| {
+        for case in items(r, "cases") {
+            (case["error"], case["image"], case["hash"], case["metrics"]) =
+                (json!("the device was lost"), Value::Null, Value::Null, json!([]));
+        }
+        r["verdicts"] = json!([]);
+    });
+    let all = found(0, &broken, &RUNS.out[0], &[]);
+    assert_eq!((&all["outcome"], &all["cases"]["recovered"]), (&json!("pass"), &json!(4)));
+    let says = "no verdict got worse, 4 cases ended with an error in the base: nothing to compare with";
+    assert!(markdown(0, &broken, &RUNS.out[0]).contains(says));
+    found(5, &RUNS.out[0], &broken, &[]);
+    let [text, _] = compare(4, &broken, &broken, &[]);
+    assert!(text.contains("4 cases ended with an error in both records"), "{text}");
+}
+
 #[test]
 fn images_of_records_are_compared_as_folders_where_asked() {
     let [one, two] = &RUNS.out;

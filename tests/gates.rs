@@ -88,11 +88,20 @@ fn a_run_is_held_against_a_base_and_explains_itself() {
     let [suite, base, now, none] = ["s.toml", "base", "now", "none"].map(|n| dir.path().join(n));
     fs::write(&suite, SUITE).unwrap();
 
-    // Without a base its gates are idle, which is no fault of the run.
+    // A base that was forgotten leaves its gates undecided, unless there is none on purpose.
     let (code, text) = run(&suite, &base, &[]);
+    assert_eq!(code, 6, "{text}");
+    assert!(text.contains("no base record was given to hold it against: give --base DIR, or --no-base"), "{text}");
+    assert!(text.contains("1 passed, 0 failed, 2 inconclusive"), "{text}");
+    let forgotten = Record::read(&base).unwrap();
+    assert_eq!(judge(&Evidence::from(&forgotten)), (forgotten.verdicts.clone(), forgotten.idle_gates.clone()));
+    let (code, text) = run(&suite, &base, &["--no-base"]);
     assert_eq!(code, 0, "{text}");
-    assert!(text.contains("no base record was given") && text.contains("WARN"), "{text}");
-    assert!(text.contains("1 passed, 0 failed, 0 inconclusive, 1 known failures, 1 warnings"), "{text}");
+    assert!(text.contains("there is no base record to hold it against (--no-base)") && text.contains("WARN"), "{text}");
+    let counts = "1 passed, 0 failed, 0 inconclusive, 1 known failures, 1 warnings, 3 not run";
+    assert!(text.contains(counts) && text.ends_with("report.md: pass\n"), "{text}");
+    let (code, text) = run(&suite, &none, &["--no-base", "--base", base.to_str().unwrap()]);
+    assert!(code == 2 && text.contains("cannot be used with"), "{text}");
     let first = Record::read(&base).unwrap();
     assert_eq!(first.idle_gates.len(), 3);
     assert!(first.idle_gates.iter().all(|g| g.excused));
@@ -155,6 +164,8 @@ fn divided(dir: &Path, suite: &Path, base: &Path, whole: &Record) {
     assert_eq!(Record::read(&merged).unwrap().verdicts, whole.verdicts);
 
     let (code, text) = run(suite, &some, &["--filter", "clipped"]);
+    assert_eq!(code, 6, "{text}");
+    let (code, text) = run(suite, &some, &["--filter", "clipped", "--no-base"]);
     assert_eq!(code, 0, "{text}");
     let better = Record::read(&some).unwrap();
     assert_eq!(of(&better, "better than classic")[0].outcome, Outcome::Pass, "{text}");
@@ -236,4 +247,75 @@ fn a_stored_record_is_judged_anew() {
         let (a, b) = (anew.p_holds.unwrap(), old.p_holds.unwrap());
         assert!(close(a.raw, b.raw) && close(a.adjusted, b.adjusted), "{a:?} {b:?}");
     }
+}
+
+/// Green means that something was judged.
+#[test]
+fn a_run_that_judges_nothing_is_not_green() {
+    let dir = tempfile::tempdir().unwrap();
+    let [suite, out] = ["s.toml", "out"].map(|n| dir.path().join(n));
+    let head = SUITE.split("[[gate]]").next().unwrap().replace("[\"curtain-arcade\"]", "[\"plane\", \"corner\"]");
+    let only = |gates: &str| fs::write(&suite, format!("{head}{gates}")).unwrap();
+    let nothing = "nothing was judged: the suite has gates, and none of them was held against anything";
+    let on_plane = "[[gate]]\nname = \"g\"\nmetric = \"openness\"\nregion = \"all\"\nscenes = [\"plane\"]\nmin = 0.5\n";
+
+    // The filter leaves nothing that the gate holds for.
+    only(on_plane);
+    let (code, text) = run(&suite, &out, &["--filter", "corner"]);
+    assert!(code == 4 && text.contains(nothing) && text.contains("0 inconclusive, 1 not run"), "{text}");
+    assert!(Record::read(&out).unwrap().has_judged_nothing());
+    let (code, text) = run(&suite, &out, &["--filter", "plane"]);
+    assert!(code == 0 && text.ends_with(": pass\n"), "{text}");
+
+    // There is no GPU, and no other gate.
+    only(&on_plane.replace("scenes = [\"plane\"]", "renderers = [\"gpu\"]"));
+    let (code, text) = run(&suite, &out, &[]);
+    assert!(code == 4 && text.contains(nothing), "{text}");
+
+    // A base that was forgotten; one that cannot be there yet; and that together with a filter.
+    only(&format!("{on_plane}against = \"base\"\n"));
+    let (code, text) = run(&suite, &out, &[]);
+    assert!(code == 6 && text.contains("give --base DIR, or --no-base"), "{text}");
+    let (code, text) = run(&suite, &out, &["--no-base"]);
+    assert!(code == 0 && text.contains("rendered; the gates wait for a base record (--no-base)"), "{text}");
+    assert!(Record::read(&out).unwrap().no_base);
+    let (code, text) = run(&suite, &out, &["--filter", "corner"]);
+    assert!(code == 4 && text.contains(nothing), "{text}");
+
+    only("");
+    let (code, text) = run(&suite, &out, &[]);
+    assert!(code == 0 && text.contains("rendered; the suite has no gates"), "{text}");
+}
+
+/// Sixteen times the replicates of a case make its own error smaller, and not that of the
+/// base: the words must not promise what they cannot keep.
+#[test]
+fn the_noise_of_a_base_is_not_promised_away() {
+    let dir = tempfile::tempdir().unwrap();
+    let [suite, base, now] = ["s.toml", "base", "now"].map(|n| dir.path().join(n));
+    let head =
+        SUITE.split("[[gate]]").next().unwrap().replace("replicates = 4\nconverged", "replicates = 8\nconverged");
+    let gate = "[[gate]]\nname = \"g\"\nmetric = \"contrast-error\"\nagainst = \"base\"\nmax = 0.02\n";
+    fs::write(&suite, format!("{head}{gate}")).unwrap();
+    assert_eq!(run(&suite, &base, &["--no-base"]).0, 0);
+    let more = format!("{head}{gate}").replace("replicates = 8\nconverged", "replicates = 128\nconverged");
+    assert!(more.contains("replicates = 128"));
+    fs::write(&suite, more).unwrap();
+    let (code, text) = run(&suite, &now, &["--seed", "2", "--base", base.to_str().unwrap()]);
+    assert_eq!(code, 6, "{text}");
+    let record = Record::read(&now).unwrap();
+    let open: Vec<&Verdict> = record.verdicts.iter().filter(|v| v.outcome == Outcome::Inconclusive).collect();
+    assert!(!open.is_empty());
+    for v in open {
+        let floor = v.floor.unwrap();
+        let theirs = v.against.as_ref().unwrap().metric.as_ref().unwrap().se.unwrap();
+        assert!(floor.se > theirs && floor.se < v.se().unwrap(), "{v:?}");
+        assert!(v.is_kept_by_floor(2) && !v.can_be_decided(2), "{v:?}");
+        let says = "more replicates of the case would not decide: the noise of the base record and of the judge";
+        assert!(v.reason.contains(says), "{}", v.reason);
+    }
+    let (_, text, _) = aogauge(&["explain", now.to_str().unwrap()]);
+    let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(text.contains("where the value lies: make a base record of more replicates, or move"), "{text}");
+    assert!(!text.contains("times the replicates") && !text.contains("replicates would decide"), "{text}");
 }

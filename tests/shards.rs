@@ -412,7 +412,9 @@ fn a_plan_is_told_filtered_and_ended_early() {
     // Of one case, with the classic case it is compared with.
     let out = dir.join("filtered");
     let some = run(dir, &out, &["--filter", "curtain-open/extended/cpu/8"]);
-    assert!(some.status.success(), "{}", String::from_utf8_lossy(&some.stderr));
+    let stderr = String::from_utf8_lossy(&some.stderr);
+    // The one gate is on another scene.
+    assert!(some.status.code() == Some(4) && stderr.contains("nothing was judged"), "{stderr}");
     let record: Value = serde_json::from_str(&fs::read_to_string(out.join("record.json")).unwrap()).unwrap();
     let whole: Value =
         serde_json::from_str(std::str::from_utf8(&WHOLE.files[Path::new("record.json")]).unwrap()).unwrap();
@@ -458,4 +460,24 @@ fn an_empty_shard_is_a_shard() {
         told.stdout.is_empty()
     });
     assert_eq!(run(dir, &out, &["--shard", &empty.unwrap()]).status.code(), Some(0));
+}
+
+#[test]
+fn the_schema_names_what_a_shard_holds() {
+    let dir = WHOLE.dir.path();
+    let out = dir.join("described");
+    let ended = run(dir, &out, &["--shard", "1/4"]);
+    assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    let shard: Value = serde_json::from_str(&fs::read_to_string(out.join("shard.json")).unwrap()).unwrap();
+    let schema = aogauge(dir, &["schema", "shard"]).output().unwrap();
+    let schema: Value = serde_json::from_slice(&schema.stdout).unwrap();
+    for key in shard.as_object().unwrap().keys() {
+        assert!(schema["properties"][key].is_object(), "{key}");
+    }
+    for required in schema["required"].as_array().unwrap() {
+        assert!(shard.get(required.as_str().unwrap()).is_some(), "{required}");
+    }
+    let help = aogauge(dir, &["schema", "--help"]).output().unwrap();
+    let help = String::from_utf8(help.stdout).unwrap();
+    assert!(help.contains(&format!("record.json, version {}", aogauge::record::VERSION)), "{help}");
 }

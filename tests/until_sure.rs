@@ -355,3 +355,31 @@ fn the_cost_of_going_on_is_not_told_as_a_bound() {
     let stderr = String::from_utf8_lossy(&told.stderr);
     assert!(stderr.contains("it counts 8 replicates a case, and a case takes 4 to 64"), "{stderr}");
 }
+
+/// The converged image is of 4 replicates of 4 rays: its noise alone keeps the verdict
+/// open, and to add replicates to the case is in vain.
+#[test]
+fn it_ends_where_replicates_cannot_decide() {
+    let [suite, out] = ["floor.toml", "floor"].map(|n| DIR.path().join(n));
+    let head = SUITE.split("[[gate]]").next().unwrap();
+    let head = head.replace("rays = [4, 16]", "rays = [4]").replace("converged_rays = 256", "converged_rays = 16");
+    let gate = "[[gate]]\nname = \"no bias\"\nmetric = \"bias\"\nregion = \"footprint\"\n\
+                scenes = [\"curtain-open\"]\nequals = 0.0\nwithin = 0.0095\n";
+    fs::write(&suite, head.replace("\"plane\", ", "") + gate).unwrap();
+    let run = |name: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_aogauge"));
+        command.current_dir(DIR.path()).args(["run", "floor.toml", "--renderer", "cpu", "--no-cache", "--until-sure"]);
+        command.args(["--max-replicates", "1024", "--out", name]).output().unwrap()
+    };
+    let ended = run("floor");
+    let stderr = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(6), "{stderr}");
+    let record = record(&out);
+    assert!(counts(&record, "curtain-open").iter().all(|(n, _)| *n <= 256), "{:?}", counts(&record, "curtain-open"));
+    let open = record["verdicts"].as_array().unwrap().iter().filter(|v| v["outcome"] == "inconclusive");
+    for verdict in open {
+        assert!(verdict["floor"]["se"].as_f64() > Some(0.0) && verdict["floor"]["df"] == 3.0, "{verdict:#}");
+        let reason = verdict["reason"].as_str().unwrap();
+        assert!(reason.contains("would not decide: the noise of the converged image is too large"), "{reason}");
+    }
+}

@@ -31,6 +31,9 @@ pub struct Coverage {
     /// Cases that give an image now and were not in the base, or ended with an error
     /// there.
     pub new: Vec<String>,
+    /// Of the new ones, those that ended with an error in the base: there is nothing to
+    /// compare them with, and that is no fault of the new run.
+    pub recovered: usize,
     /// Cases that ended with an error in both records.
     pub still_failing: usize,
 }
@@ -63,6 +66,7 @@ pub(super) fn coverage(base: &Record, new: &Record) -> Coverage {
         let id = is.case.id();
         let gave = old.get(&id).is_some_and(|c| c.error.is_none());
         if is.error.is_none() && !gave {
+            found.recovered += usize::from(old.contains_key(&id));
             found.new.push(id);
         } else if is.error.is_some() && old.contains_key(&id) && !gave {
             found.still_failing += 1;

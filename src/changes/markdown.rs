@@ -50,7 +50,8 @@ pub fn markdown(changes: &Changes) -> String {
 
 fn head(changes: &Changes) -> String {
     let summary = &changes.summary.new;
-    let doubt = summary.fail + summary.inconclusive + changes.metrics.turned(Turn::Worse) + changes.moved();
+    let doubt =
+        summary.fail + summary.inconclusive + changes.warns() + changes.metrics.turned(Turn::Worse) + changes.moved();
     let sign = match changes.outcome {
         Outcome::Lost | Outcome::Worse => "❌ FAIL",
         Outcome::Nothing => "⚠️ CHECK",

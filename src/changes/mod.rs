@@ -6,6 +6,7 @@
 //! said and not compared.
 
 mod coverage;
+mod edits;
 mod grounds;
 mod images;
 mod markdown;
@@ -16,6 +17,7 @@ mod times;
 mod verdicts;
 
 pub use coverage::{Coverage, LostCase};
+pub use edits::GateEdit;
 pub use grounds::{Incomparable, Kind};
 pub use images::{ImageChange, ImageState, images};
 pub use markdown::{MAX_BYTES, markdown, marker};
@@ -51,7 +53,7 @@ pub enum Turn {
     /// For the worse.
     Worse,
     /// Neither: it has no better side, or both sides are as far from it. Of verdicts, a
-    /// pass that became a known failure, or a verdict without one before.
+    /// pass that became a warning or a known failure, or a verdict without one before.
     Changed,
     /// For the better.
     Better,
@@ -65,7 +67,7 @@ pub enum Outcome {
     Lost,
     /// A verdict got worse.
     Worse,
-    /// The records have no case in common.
+    /// The records have no case in common that gave an image in the new one.
     Nothing,
     /// No verdict got worse, and nothing was lost.
     Pass,
@@ -129,7 +131,7 @@ pub fn changes(base: &Record, new: &Record, images: Vec<ImageChange>, allow_miss
         Outcome::Lost
     } else if verdicts.iter().any(|v| v.turn == Turn::Worse) {
         Outcome::Worse
-    } else if cases.compared == 0 {
+    } else if cases.compared + cases.recovered == 0 {
         Outcome::Nothing
     } else {
         Outcome::Pass
@@ -158,6 +160,12 @@ impl Changes {
         self.verdicts.iter().filter(|v| v.turn == turn).count()
     }
 
+    /// Verdicts that warn and did not.
+    pub fn warns(&self) -> usize {
+        let did = Some(crate::gate::Outcome::Warn);
+        self.verdicts.iter().filter(|v| Some(v.new) == did && v.base != did).count()
+    }
+
     /// Images that moved, or were lost.
     pub fn moved(&self) -> usize {
         self.images.iter().filter(|i| i.state <= ImageState::Moved).count()
@@ -180,10 +188,21 @@ impl Changes {
             }
         }
         if self.outcome == Outcome::Nothing {
-            says.push("the records have no case in common".to_owned());
+            says.push(match self.cases.still_failing {
+                0 => "the records have no case in common".to_owned(),
+                n => format!("{} in both records", counted(n, "case ended with an error", "cases ended with an error")),
+            });
         }
         if says.is_empty() {
             says.push("no verdict got worse".to_owned());
+        }
+        let warns = self.warns();
+        if warns > 0 {
+            says.push(counted(warns, "warns that did not", "warn that did not"));
+        }
+        if self.cases.recovered > 0 {
+            let n = counted(self.cases.recovered, "case", "cases");
+            says.push(format!("{n} ended with an error in the base: nothing to compare with"));
         }
         // What is not worse than before may still be bad.
         let (fail, open) = (self.summary.new.fail, self.summary.new.inconclusive);

@@ -110,16 +110,21 @@ fn verdicts(changes: &Changes) -> Table {
         let turned = format!("{was} → {}", outcome_text(v.new));
         // That a limit holds or is broken is what the verdict says.
         let why = if v.reason.starts_with("the limit ") { String::new() } else { format!(" ({})", v.reason) };
+        let warn = v.warn.as_ref().map_or_else(String::new, |w| format!(", and warns unless {w}"));
+        let edited = match v.edited.as_slice() {
+            [] => String::new(),
+            edits => format!("; the gate itself changed: {}", edits.join(", ")),
+        };
         vec![
             if v.turn == Turn::Worse { Strong(turned) } else { Plain(turned) },
             Plain(v.gate.clone()),
             Code(v.case.clone()),
             Plain(v.base.map_or_else(|| "–".to_owned(), |_| value_text(v.value.base, v.interval.base))),
             Plain(value_text(v.value.new, v.interval.new)),
-            Plain(format!("{} {}{why}", v.metric, v.limit)),
+            Plain(format!("{} {}{warn}{edited}{why}", v.metric, v.limit)),
         ]
     };
-    let kinds = [(Turn::Worse, "worse"), (Turn::Better, "better"), (Turn::Changed, "new or excused")];
+    let kinds = [(Turn::Worse, "worse"), (Turn::Better, "better"), (Turn::Changed, "new, warning or excused")];
     Table {
         title: format!("Verdicts: {}", said(&kinds.map(|(turn, word)| (changes.turned(turn), word)))),
         intro: String::new(),
@@ -174,6 +179,9 @@ fn gates(changes: &Changes) -> Table {
     let on = |n, o| format!("{} on {}", outcome(o), counted(n, "case", "cases"));
     let mut rows: Vec<Vec<Cell>> =
         gates.limits.iter().map(|l| row("other limit", &l.gate, l.base.clone(), l.new.clone())).collect();
+    rows.extend(
+        gates.edits.iter().map(|e| row(&format!("other {}", e.option), &e.gate, e.base.clone(), e.new.clone())),
+    );
     rows.extend(gates.gone.iter().map(|g| match &g.idle {
         Some(why) => row("not run", &g.gate, on(g.cases, g.outcome), why.clone()),
         None => row("gone", &g.gate, on(g.cases, g.outcome), "–".to_owned()),

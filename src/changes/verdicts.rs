@@ -1,6 +1,6 @@
 //! Verdicts and gates that changed.
 
-use super::{Both, Turn};
+use super::{Both, GateEdit, Turn, edits::edits};
 use crate::{
     gate::{Outcome, Verdict},
     record::Record,
@@ -22,14 +22,18 @@ pub struct VerdictChange {
     pub new: Outcome,
     /// Which way it went.
     pub turn: Turn,
-    /// The metric.
+    /// What is held against the limit: the metric, and what it is less of.
     pub metric: String,
-    /// The metric's value.
+    /// Its value; null in the base where something else was held against the limit.
     pub value: Both<Option<f64>>,
-    /// Its 95 % interval.
+    /// Its interval of the gate's confidence alone.
     pub interval: Both<Option<[f64; 2]>>,
     /// What it must satisfy now.
     pub limit: String,
+    /// The stricter limit whose breach warns now; null where there is none.
+    pub warn: Option<String>,
+    /// What became another in the gate itself, its limit among it, in words.
+    pub edited: Vec<String>,
     /// Why it is what it is now.
     pub reason: String,
 }
@@ -89,6 +93,8 @@ pub struct Gates {
     pub gone: Vec<GoneGate>,
     /// Limits that changed.
     pub limits: Vec<LimitChange>,
+    /// What else changed in a gate of the same name.
+    pub edits: Vec<GateEdit>,
     /// Cases that a gate does not hold for any more.
     pub withdrawn: Vec<Withdrawn>,
 }
@@ -96,7 +102,8 @@ pub struct Gates {
 impl Gates {
     /// Whether all is as it was.
     pub fn is_empty(&self) -> bool {
-        self.new.is_empty() && self.gone.is_empty() && self.limits.is_empty() && self.withdrawn.is_empty()
+        let Gates { new, gone, limits, edits, withdrawn } = self;
+        new.is_empty() && gone.is_empty() && limits.is_empty() && edits.is_empty() && withdrawn.is_empty()
     }
 }
 
@@ -106,25 +113,41 @@ fn by_key(record: &Record) -> BTreeMap<Key, &Verdict> {
     record.verdicts.iter().map(|v| ((v.gate.clone(), v.subject()), v)).collect()
 }
 
-/// Outcomes are in order, the worst first. A known failure is what the suite says it
-/// is: no worse than a pass.
+/// Outcomes are in order, the worst first. A warning is told and passes, and a known failure is what
+/// the suite says it is: neither is worse than a pass.
 fn turn(base: Option<Outcome>, new: Outcome) -> Turn {
-    match base {
-        None => Turn::Changed,
-        Some(Outcome::Pass) if new == Outcome::KnownFailure => Turn::Changed,
-        Some(base) if new < base => Turn::Worse,
-        Some(_) => Turn::Better,
+    let Some(base) = base else { return Turn::Changed };
+    let passes = |o: Outcome| o > Outcome::Inconclusive;
+    match (passes(base), passes(new)) {
+        (true, true) if new == Outcome::Pass => Turn::Better,
+        (true, true) => Turn::Changed,
+        _ if new < base => Turn::Worse,
+        _ => Turn::Better,
     }
+}
+
+/// What a verdict demands, where it may be held against that of another record.
+fn held(v: &Verdict) -> impl PartialEq {
+    (v.metric.name, v.metric.region, v.against.as_ref().map(|o| o.name.clone()))
+}
+
+/// What became another in a gate, in words.
+fn edited(was: Option<&Verdict>, v: &Verdict, edits: &[GateEdit]) -> Vec<String> {
+    let limit = was.filter(|w| w.limit != v.limit).map(|w| ("limit", w.limit.text(), v.limit.text()));
+    let others = edits.iter().filter(|e| e.gate == v.gate);
+    let others = others.map(|e| (e.option.as_str(), e.base.clone(), e.new.clone()));
+    limit.into_iter().chain(others).map(|(option, base, new)| format!("{option} {base} → {new}")).collect()
 }
 
 /// Verdicts that changed, the worse first, the worst of them first, then in the order
 /// of gates and cases.
 pub(super) fn changed(base: &Record, new: &Record) -> Vec<VerdictChange> {
-    let old = by_key(base);
+    let (old, edits) = (by_key(base), edits(base, new));
     let change = |v: &Verdict| {
         let case = v.subject();
         let was = old.get(&(v.gate.clone(), case.clone())).copied();
         let outcome = was.map(|w| w.outcome);
+        let alike = was.filter(|w| held(w) == held(v));
         let is_told = outcome.map_or(v.outcome < Outcome::KnownFailure, |o| o != v.outcome);
         is_told.then(|| VerdictChange {
             gate: v.gate.clone(),
@@ -132,10 +155,12 @@ pub(super) fn changed(base: &Record, new: &Record) -> Vec<VerdictChange> {
             base: outcome,
             new: v.outcome,
             turn: turn(outcome, v.outcome),
-            metric: v.metric.title(),
-            value: Both { base: was.and_then(|w| w.metric.value), new: v.metric.value },
-            interval: Both { base: was.and_then(|w| w.interval), new: v.interval },
+            metric: v.title(),
+            value: Both { base: alike.and_then(Verdict::value), new: v.value() },
+            interval: Both { base: alike.and_then(|w| w.interval), new: v.interval },
             limit: v.limit.text(),
+            warn: v.warn.map(|w| w.text()),
+            edited: edited(was, v, &edits),
             reason: v.reason.clone(),
         })
     };
@@ -172,13 +197,14 @@ pub(super) fn gates(base: &Record, new: &Record) -> Gates {
     let rendered: BTreeSet<String> = new.cases.iter().map(|c| c.case.id()).collect();
     let is_there = |v: &Verdict| match &v.case {
         Some(case) => rendered.contains(&case.id()),
-        None => new.scenes.iter().any(|s| s.name == v.scene),
+        None => v.is_on_judge() && new.scenes.iter().any(|s| s.name == v.scene),
     };
     let withdrawn = old.iter().filter(|(k, v)| is.contains(&k.0) && !verdicts.contains_key(k) && is_there(v));
     Gates {
         new: is.difference(&was).map(new_gate).collect(),
         gone: was.difference(&is).map(gone_gate).collect(),
         limits: limits.collect(),
+        edits: edits(base, new),
         withdrawn: withdrawn
             .map(|((gate, case), v)| Withdrawn { gate: gate.clone(), case: case.clone(), outcome: v.outcome })
             .collect(),

@@ -32,6 +32,9 @@ pub struct Args {
     /// run --until-sure, the one that they were given.
     #[arg(long, value_name = "DIR")]
     base: Option<PathBuf>,
+    /// There is no earlier record yet: gates against it are left out.
+    #[arg(long, conflicts_with = "base")]
+    no_base: bool,
     #[command(flatten)]
     beside: Beside,
     /// What is printed on standard output: nothing, or the record.
@@ -57,6 +60,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
         plan = plan.only(filter);
     }
     plan.base = base(args.base.as_deref(), &suite)?;
+    plan.no_base = args.no_base;
     let prepared = Prepared::new(&plan)?;
     let (folder, record) = shards.merge(&prepared, &args.out, &bar())?;
     tell_moved(&folder);

@@ -54,6 +54,7 @@ impl Exit {
             End::Incomplete => Exit::Incomplete,
             End::Fail => Exit::Failed,
             End::Inconclusive => Exit::Inconclusive,
+            End::Nothing => Exit::Nothing,
             End::Pass => Exit::Pass,
         }
     }

@@ -49,6 +49,10 @@ pub struct Args {
     /// merge; with --until-sure to all of them, too.
     #[arg(long, value_name = "DIR")]
     base: Option<PathBuf>,
+    /// There is no earlier record yet: gates against it are left out. Without this and without
+    /// --base they are inconclusive.
+    #[arg(long, conflicts_with = "base")]
+    no_base: bool,
     /// Who renders.
     #[arg(long, value_enum, default_value_t)]
     renderer: Choice,
@@ -189,6 +193,7 @@ fn prepare(
     };
     let mut plan = Plan::new(suite, platform, args.seed);
     plan.base = base(args.base.as_deref(), suite)?;
+    plan.no_base = args.no_base;
     if args.base.is_some() && shard.is_some() && !args.until_sure {
         tell("aogauge: --base is of no use to a shard without --until-sure: give it to merge");
     }
@@ -272,7 +277,9 @@ pub(super) fn finish(record: &Record, folder: &RecordFolder, beside: &Beside, fo
     let files = beside.make(record, folder.path(), format)?;
     let exit = Exit::of(record);
     let end = match exit {
-        Exit::Pass if record.verdicts.is_empty() => "rendered; the suite has no gates",
+        Exit::Pass if record.verdicts.is_empty() && record.idle_gates.is_empty() => "rendered; the suite has no gates",
+        Exit::Pass if record.verdicts.is_empty() => "rendered; the gates wait for a base record (--no-base)",
+        Exit::Nothing => "nothing was judged: the suite has gates, and none of them was held against anything",
         Exit::Pass => "pass",
         _ => "not a pass",
     };
@@ -368,6 +375,7 @@ within = 0.001
             out: dir.path().join("out"),
             seed: None,
             base: None,
+            no_base: false,
             renderer: Choice::Gpu,
             threads: None,
             filter: None,

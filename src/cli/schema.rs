@@ -3,7 +3,7 @@
 use super::{Exit, Failure, explain::Explanations, golden, json, print};
 use crate::{
     bench::GpuBench, changes::Changes, compare::Comparison, flatland::Study, golden::Verification, record::Record,
-    report::digest::Digest, scenes::Scene, suite::SuiteFile,
+    report::digest::Digest, run::ShardRecord, scenes::Scene, suite::SuiteFile,
 };
 use clap::ValueEnum;
 
@@ -18,9 +18,11 @@ pub struct Args {
 
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 enum Of {
-    /// record.json
+    /// record.json, version 4; of version 3, which is read too, there is no schema.
     #[default]
     Record,
+    /// shard.json
+    Shard,
     /// Suite files.
     Suite,
     /// Scene files.
@@ -48,6 +50,7 @@ enum Of {
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
     let schema = match args.of {
         Of::Record => schemars::schema_for!(Record),
+        Of::Shard => schemars::schema_for!(ShardRecord),
         Of::Suite => schemars::schema_for!(SuiteFile),
         Of::Scene => Scene::file_schema(),
         Of::Flatland => schemars::schema_for!(Study),

@@ -3,10 +3,10 @@
 use super::{
     Gate, Other, Outcome, PValue, Verdict,
     against::{Parts, estimate},
-    place, words,
+    floor, place, words,
 };
 use crate::{
-    metrics::{Absent, Metric},
+    metrics::{Absent, Metric, MetricName},
     record::{CaseRecord, IdleGate, Record, SceneRecord, SuiteInfo},
     stats::{Estimate, holm, spending},
     suite::Case,
@@ -28,6 +28,8 @@ pub struct Evidence<'a> {
     pub cases: &'a [CaseRecord],
     /// The record that gates `against` [`BASE`](super::BASE) need.
     pub base: Option<&'a Record>,
+    /// Whether there is none on purpose: then such gates are idle with an excuse.
+    pub no_base: bool,
 }
 
 impl<'a> From<&'a Record> for Evidence<'a> {
@@ -40,6 +42,7 @@ impl<'a> From<&'a Record> for Evidence<'a> {
             scenes: &record.scenes,
             cases: &record.cases,
             base: None,
+            no_base: record.no_base,
         }
     }
 }
@@ -57,8 +60,8 @@ impl<'a> From<&'a Record> for Evidence<'a> {
 /// [`spending`](crate::stats::spending)(k); a difference from a base record with looks
 /// of its own by both, since either may have been looked at with any look of the other.
 pub fn judge(evidence: &Evidence<'_>) -> (Vec<Verdict>, Vec<IdleGate>) {
-    let Evidence { suite, gpu, filter, scenes, cases, base } = *evidence;
-    let run = Run { parts: Parts { suite, scenes, cases }, base: base.map(Parts::from), gpu, filter };
+    let Evidence { suite, gpu, filter, scenes, cases, base, no_base } = *evidence;
+    let run = Run { parts: Parts { suite, scenes, cases }, base: base.map(Parts::from), no_base, gpu, filter };
     let (mut drafts, mut idle) = (Vec::new(), Vec::new());
     for gate in &suite.gates {
         match run.drafts(gate) {
@@ -89,6 +92,8 @@ struct Draft<'a> {
     case: Option<&'a CaseRecord>,
     metric: Metric,
     other: Option<Other>,
+    /// The estimator that the gate names and no case of which has the metric.
+    lacking: Option<&'a str>,
     spent: f64,
 }
 
@@ -106,6 +111,7 @@ impl Draft<'_> {
 struct Run<'a> {
     parts: Parts<'a>,
     base: Option<Parts<'a>>,
+    no_base: bool,
     gpu: &'a str,
     filter: Option<&'a str>,
 }
@@ -117,9 +123,6 @@ impl<'a> Run<'a> {
         let no_gpu = !self.parts.cases.iter().any(|c| c.case.renderer == "gpu");
         if no_gpu && !gate.renderers.is_empty() && gate.renderers.iter().all(|r| r == "gpu") {
             return Err(idle(format!("this run used no GPU: {}", self.gpu), true));
-        }
-        if gate.is_against_base() && self.base.is_none() {
-            return Err(idle("no base record was given to hold it against (run --base DIR)".to_owned(), true));
         }
         let mut drafts = Vec::new();
         for scene in self.parts.scenes.iter().filter(|s| gate.applies_to_judge(&s.name)) {
@@ -143,6 +146,16 @@ impl<'a> Run<'a> {
                 None => idle("no case of this run has this metric".to_owned(), false),
             });
         }
+        if gate.is_against_base() && self.base.is_none() {
+            return Err(match self.no_base {
+                true => idle("there is no base record to hold it against (--no-base)".to_owned(), true),
+                false => {
+                    let why = "no base record was given to hold it against: give --base DIR, or --no-base where there is \
+                               none yet";
+                    idle(why.to_owned(), false)
+                }
+            });
+        }
         if self.filter.is_none() {
             drafts.extend(missing(gate, &drafts));
         }
@@ -160,17 +173,18 @@ impl<'a> Run<'a> {
             }
             other
         });
-        Draft { gate, scene, case, metric, other, spent }
+        Draft { gate, scene, case, metric, other, lacking: None, spent }
     }
 
     /// The verdict, when all p-values are there.
     fn settle(&self, draft: &Draft<'_>, families: &Families, i: usize) -> Verdict {
-        let Draft { gate, scene, case, metric, other, spent } = draft;
+        let Draft { gate, scene, case, metric, other, lacking, spent } = draft;
         let held = draft.held();
         let mut verdict = Verdict {
             gate: gate.name.clone(),
             scene: (*scene).to_owned(),
             case: case.map(|c| c.case.clone()),
+            lacking: lacking.map(str::to_owned),
             metric: metric.clone(),
             against: other.clone(),
             limit: gate.limit,
@@ -179,6 +193,7 @@ impl<'a> Run<'a> {
             interval: None,
             margin: None,
             detectable: None,
+            floor: None,
             p_holds: families.p(Test::Holds, i),
             p_broken: families.p(Test::Broken, i),
             p_warn_broken: families.p(Test::WarnBroken, i),
@@ -188,7 +203,8 @@ impl<'a> Run<'a> {
             outcome: Outcome::Inconclusive,
             reason: String::new(),
         };
-        if let Some(record) = self.parts.scene(scene) {
+        let is_there = case.is_some() || gate.metric == MetricName::JudgeContrast;
+        if let Some(record) = self.parts.scene(scene).filter(|_| is_there) {
             let on_screen = case.is_some_and(|c| self.parts.is_on_screen(&c.case.estimator));
             verdict.place = Some(place::place(metric, record, *case, on_screen));
             verdict.picture = place::picture(metric, record, *case);
@@ -200,6 +216,8 @@ impl<'a> Run<'a> {
                 verdict.margin = Some(gate.limit.margin(held.value));
                 let level = gate.alpha() * spent / families.size.max(1) as f64;
                 verdict.detectable = gate.limit.detectable(&held, level);
+                let theirs = other.as_ref().and_then(|o| Some((o.name.as_str(), o.metric.as_ref()?)));
+                verdict.floor = floor::of_held(metric, theirs);
                 verdict.outcome = outcome(gate, &verdict);
                 verdict.reason = words::reason(gate, &verdict, families.size);
             }
@@ -211,17 +229,20 @@ impl<'a> Run<'a> {
 
 /// A scene or an estimator that the gate names must not drop out of it unseen.
 fn missing<'a>(gate: &'a Gate, drafts: &[Draft<'a>]) -> Vec<Draft<'a>> {
-    let none = |scene: &'a str, why: &str| {
+    let none = |scene: &'a str, lacking: Option<&'a str>, why: &str| {
         let metric = absent(gate, why);
-        Draft { gate, scene, case: None, metric, other: None, spent: 1.0 }
+        Draft { gate, scene, case: None, metric, other: None, lacking, spent: 1.0 }
     };
     let has = |d: &Draft<'_>, name: &str| d.case.is_some_and(|c| c.case.estimator == name);
     let scenes = gate.scenes.iter().filter(|s| !drafts.iter().any(|d| d.scene == **s));
     let estimators = gate.estimators.iter().filter(|e| !drafts.iter().any(|d| has(d, e)));
     let first = drafts.first().map_or("", |d| d.scene);
     scenes
-        .map(|scene| none(scene, "no case of this scene has this metric"))
-        .chain(estimators.map(|name| none(first, &format!("no case of the estimator '{name}' has this metric"))))
+        .map(|scene| none(scene, None, "no case of this scene has this metric"))
+        .chain(estimators.map(|name| {
+            let why = format!("no case of the estimator '{name}' has this metric");
+            none(first, Some(name.as_str()), &why)
+        }))
         .collect()
 }
 

@@ -7,6 +7,7 @@
 
 mod against;
 mod family;
+mod floor;
 mod limit;
 mod place;
 #[cfg(test)]

@@ -10,7 +10,7 @@ use crate::{
 };
 use serde_json::json;
 
-fn gate(limit: Limit) -> Gate {
+pub(super) fn gate(limit: Limit) -> Gate {
     Gate {
         name: "g".into(),
         metric: MetricName::Contrast,
@@ -27,11 +27,11 @@ fn gate(limit: Limit) -> Gate {
     }
 }
 
-fn case(scene: &str, estimator: &str, renderer: &str, rays: u32) -> Case {
+pub(super) fn case(scene: &str, estimator: &str, renderer: &str, rays: u32) -> Case {
     Case { scene: scene.into(), estimator: estimator.into(), renderer: renderer.into(), rays }
 }
 
-fn measured(case: Case, value: f64, se: f64) -> CaseRecord {
+pub(super) fn measured(case: Case, value: f64, se: f64) -> CaseRecord {
     let estimate = Estimate { value, se, df: 15.0 };
     CaseRecord {
         image: Some(format!("images/{}/x.exr", case.scene)),
@@ -41,7 +41,7 @@ fn measured(case: Case, value: f64, se: f64) -> CaseRecord {
     }
 }
 
-fn scene(name: &str) -> SceneRecord {
+pub(super) fn scene(name: &str) -> SceneRecord {
     serde_json::from_value(json!({
         "name": name, "description": "", "control": false, "hash": "0123456789abcdef", "radius": 1.0,
         "secondary_radius": 0.25, "triangles": 2, "resolution": [8, 8], "transect": [],
@@ -52,7 +52,7 @@ fn scene(name: &str) -> SceneRecord {
     .unwrap()
 }
 
-fn suite(gates: Vec<Gate>) -> SuiteInfo {
+pub(super) fn suite(gates: Vec<Gate>) -> SuiteInfo {
     let gates = serde_json::to_value(gates).unwrap();
     serde_json::from_value(json!({
         "name": "x", "description": "", "replicates": 16, "converged_rays": 512, "golden_rays": null,
@@ -63,7 +63,7 @@ fn suite(gates: Vec<Gate>) -> SuiteInfo {
     .unwrap()
 }
 
-fn record(suite: SuiteInfo, scenes: Vec<SceneRecord>, cases: Vec<CaseRecord>) -> Record {
+pub(super) fn record(suite: SuiteInfo, scenes: Vec<SceneRecord>, cases: Vec<CaseRecord>) -> Record {
     serde_json::from_value(json!({
         "version": 4, "tool": "", "suite": suite, "seed": 1,
         "machine": {"os": "", "arch": "", "cpu": "", "gpu": "", "gpu_is_software": null},
@@ -75,9 +75,16 @@ fn record(suite: SuiteInfo, scenes: Vec<SceneRecord>, cases: Vec<CaseRecord>) ->
 }
 
 /// Verdicts in the order of gates and cases.
-fn judged(gates: Vec<Gate>, cases: &[CaseRecord], base: Option<&Record>) -> (Vec<Verdict>, Vec<IdleGate>) {
-    let evidence =
-        Evidence { suite: &suite(gates), gpu: "no adapter", filter: None, scenes: &[scene("s")], cases, base };
+pub(super) fn judged(gates: Vec<Gate>, cases: &[CaseRecord], base: Option<&Record>) -> (Vec<Verdict>, Vec<IdleGate>) {
+    let evidence = Evidence {
+        suite: &suite(gates),
+        gpu: "no adapter",
+        filter: None,
+        scenes: &[scene("s")],
+        cases,
+        base,
+        no_base: false,
+    };
     let (mut verdicts, idle) = judge(&evidence);
     let key = |v: &Verdict| (v.gate.clone(), cases.iter().position(|c| Some(&c.case) == v.case.as_ref()));
     verdicts.sort_by_key(key);
@@ -321,8 +328,14 @@ fn a_metric_is_held_against_another_estimator() {
 fn a_metric_is_held_against_the_base_record() {
     let against = Gate { against: Some("base".into()), ..gate(Limit::AtMost(0.1)) };
     let now = [measured(case("s", "e", "cpu", 4), 0.52, 0.01)];
+    // Without one they are undecided, unless there is none on purpose.
     let (verdicts, idle) = judged(vec![against.clone()], &now, None);
-    assert!(verdicts.is_empty() && idle[0].excused && idle[0].reason.contains("--base"));
+    assert!(verdicts.is_empty() && !idle[0].excused && idle[0].reason.contains("give --base DIR, or --no-base"));
+    let suite_of = suite(vec![against.clone()]);
+    let alone = record(suite_of.clone(), vec![scene("s")], now.to_vec());
+    let none = Evidence { no_base: true, ..Evidence::from(&alone) };
+    let (verdicts, idle) = judge(&none);
+    assert!(verdicts.is_empty() && idle[0].excused && idle[0].reason.contains("(--no-base)"));
 
     let base = record(suite(vec![]), vec![scene("s")], vec![measured(case("s", "e", "cpu", 4), 0.5, 0.01)]);
     let at = |base: &Record, gate: &Gate| judged(vec![gate.clone()], &now, Some(base)).0.remove(0);
@@ -377,7 +390,16 @@ fn gates_that_nothing_was_held_against_are_told() {
     // Whoever asked for some cases only does not get the others.
     let some = |gate: Gate| {
         let suite = suite(vec![gate]);
-        judge(&Evidence { suite: &suite, gpu: "", filter: Some("s/e"), scenes: &[scene("s")], cases: &cpu, base: None })
+        let all = Evidence {
+            suite: &suite,
+            gpu: "",
+            filter: Some("s/e"),
+            scenes: &[scene("s")],
+            cases: &cpu,
+            base: None,
+            no_base: false,
+        };
+        judge(&all)
     };
     let (verdicts, idle) = some(Gate { rays: vec![8], ..gate(Limit::AtLeast(0.5)) });
     assert!(verdicts.is_empty() && idle[0].excused && idle[0].reason.contains("--filter s/e"));
@@ -393,6 +415,21 @@ fn gates_that_nothing_was_held_against_are_told() {
         assert_eq!(outcomes, [Outcome::Inconclusive, Outcome::Pass]);
         assert!(verdicts[0].reason.contains("has this metric"));
     }
+    // Nor is it taken for the judge, or one for the other.
+    let named = Gate {
+        scenes: vec!["s".into(), "gone".into()],
+        estimators: vec!["e".into(), "a".into(), "b".into()],
+        ..gate(Limit::AtLeast(0.5))
+    };
+    let (verdicts, _) = judged(vec![named], &cpu, None);
+    let open: Vec<_> = verdicts.iter().filter(|v| v.outcome == Outcome::Inconclusive).collect();
+    let subjects: Vec<_> = open.iter().map(|v| v.subject()).collect();
+    assert_eq!(subjects, ["gone (no case)", "a (no case)", "b (no case)"]);
+    assert!(open.iter().all(|v| v.picture.is_none() && v.place.is_none()));
+    let text = words::explain(open[1], 1).join("\n");
+    assert!(text.contains("contrast of a: K, the mean") && !text.contains("judge"), "{text}");
+    let text = words::explain(open[0], 1).join("\n");
+    assert!(text.contains("contrast in gone: K") && !text.contains("judge"), "{text}");
 }
 
 /// The words of each outcome say what they must.

@@ -2,7 +2,7 @@
 
 use super::{CONFIDENCE, Limit};
 use crate::{
-    metrics::{Metric, Quantity},
+    metrics::{Floor, Metric, MetricName, Quantity},
     suite::Case,
 };
 use schemars::JsonSchema;
@@ -59,8 +59,12 @@ pub struct Verdict {
     pub gate: String,
     /// The scene.
     pub scene: String,
-    /// The case; null for gates on the judge.
+    /// The case; null for gates on the judge, and where there is no case.
     pub case: Option<Case>,
+    /// The estimator that the gate names and no case of which has the metric; absent in all
+    /// other verdicts.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub lacking: Option<String>,
     /// What was measured.
     pub metric: Metric,
     /// What it is held against besides a number.
@@ -88,6 +92,11 @@ pub struct Verdict {
     /// of what could have been found.
     #[serde(default)]
     pub detectable: Option<f64>,
+    /// The part of the standard error of what is held against the limit that more
+    /// replicates of the case do not make smaller: that of the judge, of the converged image, of a
+    /// base record. Absent where there is none.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub floor: Option<Floor>,
     /// The p-value of "the limit is broken": small where it holds. Null where the
     /// metric is, and in records of version 3 but for `equals`.
     #[serde(default)]
@@ -134,9 +143,20 @@ impl Verdict {
         self.against.as_ref().map_or(self.metric.se, |o| o.difference.se)
     }
 
-    /// The case, or `scene (judge)`.
+    /// The case, or `scene (judge)`; `scene (no case)` or `estimator (no case)` where the gate
+    /// names one that has none.
     pub fn subject(&self) -> String {
-        self.case.as_ref().map_or_else(|| format!("{} (judge)", self.scene), Case::id)
+        match (&self.case, &self.lacking) {
+            (Some(case), _) => case.id(),
+            (None, Some(estimator)) => format!("{estimator} (no case)"),
+            (None, None) if self.is_on_judge() => format!("{} (judge)", self.scene),
+            (None, None) => format!("{} (no case)", self.scene),
+        }
+    }
+
+    /// Whether the judge was measured, and no case.
+    pub fn is_on_judge(&self) -> bool {
+        self.metric.name == MetricName::JudgeContrast
     }
 
     /// What is held against the limit, for people: the metric, and what it is less of.

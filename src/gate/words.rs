@@ -1,6 +1,6 @@
 //! Verdicts in words.
 
-use super::{Gate, Limit, Other, Outcome, POWER, PValue, Verdict};
+use super::{Gate, Limit, Other, Outcome, POWER, PValue, Verdict, floor::Source};
 use crate::metrics::MetricName;
 
 /// Why a verdict with p-values came out as it did, in a sentence.
@@ -35,7 +35,7 @@ fn undecided(verdict: &Verdict, family: usize) -> String {
     let alpha = 1.0 - verdict.confidence;
     let numbers = p_words(p, family);
     if p.raw >= alpha {
-        "the interval holds the limit: more replicates would decide".to_owned() + &format!(" ({numbers})")
+        format!("the interval holds the limit{} ({numbers})", prospect(verdict, family))
     } else if p.raw / verdict.spent >= alpha {
         format!(
             "the interval clears the limit, but not after so many looks at the case: that it {what} is not sure ({numbers})"
@@ -45,6 +45,22 @@ fn undecided(verdict: &Verdict, family: usize) -> String {
             "the interval clears the limit alone, but not over {family} verdicts: that it {what} is not sure ({numbers})"
         )
     }
+}
+
+/// Whether more replicates would decide.
+fn prospect(verdict: &Verdict, family: usize) -> String {
+    if verdict.replicates_needed(family).is_some() {
+        ": more replicates would decide".to_owned()
+    } else if verdict.is_kept_by_floor(family) {
+        format!(", and more replicates of the case would not decide: the noise of {} is too large", listed(verdict))
+    } else {
+        ", on which the value lies as near as it can be told".to_owned()
+    }
+}
+
+/// What a part of the standard error comes from besides the case's replicates.
+fn listed(verdict: &Verdict) -> String {
+    verdict.sources().iter().map(|s| s.name).collect::<Vec<_>>().join(" and of ")
 }
 
 fn p_words(p: PValue, family: usize) -> String {
@@ -109,11 +125,12 @@ fn meaning(name: MetricName) -> &'static str {
 pub fn explain(verdict: &Verdict, family: usize) -> Vec<String> {
     let mut text = vec![measured(verdict)];
     text.extend(verdict.against.as_ref().map(|other| held_against(verdict, other)));
+    text.extend(fixed(verdict));
     text.extend(distance(verdict));
     text.extend(evidence(verdict, family));
     text.extend(detectable(verdict));
     text.push(format!("{}: {}.", outcome(verdict.outcome), verdict.reason.trim_end_matches('.')));
-    text.push(next(verdict));
+    text.push(next(verdict, family));
     text.extend(verdict.picture.as_ref().map(|p| format!("See {p}.")));
     text
 }
@@ -130,10 +147,12 @@ fn outcome(outcome: Outcome) -> &'static str {
 
 fn measured(verdict: &Verdict) -> String {
     let Verdict { metric, .. } = verdict;
-    let of = verdict.case.as_ref().map_or_else(
-        || format!("of the judge of {}", verdict.scene),
-        |c| format!("of {} on the {} with {} rays a pixel in {}", c.estimator, c.renderer, c.rays, c.scene),
-    );
+    let of = match (&verdict.case, &verdict.lacking) {
+        (Some(c), _) => format!("of {} on the {} with {} rays a pixel in {}", c.estimator, c.renderer, c.rays, c.scene),
+        (None, Some(estimator)) => format!("of {estimator}"),
+        (None, None) if verdict.is_on_judge() => format!("of the judge of {}", verdict.scene),
+        (None, None) => format!("in {}", verdict.scene),
+    };
     let place = verdict.place.as_ref().map_or_else(String::new, |p| format!(", over {p}"));
     let mut text = format!("Measured is {} {of}: {}{place}.", metric.name.label(), meaning(metric.name));
     text += &match (metric.value, metric.se) {
@@ -165,6 +184,17 @@ fn held_against(verdict: &Verdict, other: &Other) -> String {
         (Some(theirs), None) => format!("That of {whose} is {theirs}, but there is no difference to be had."),
         _ => format!("It cannot be held against {whose}."),
     }
+}
+
+/// What of the standard error more replicates leave as it is.
+fn fixed(verdict: &Verdict) -> Option<String> {
+    let (floor, se) = (verdict.floor?, verdict.se()?);
+    let share = match floor.se {
+        part if part < se => format!("Of the standard error {} is that", number(part)),
+        _ => "The standard error is that".to_owned(),
+    };
+    let most = verdict.case.as_ref().map_or("", |_| ": more replicates of the case leave it as it is");
+    Some(format!("{share} of {}{most}.", listed(verdict)))
 }
 
 fn distance(verdict: &Verdict) -> Option<String> {
@@ -246,10 +276,13 @@ fn detectable(verdict: &Verdict) -> Option<String> {
     })
 }
 
-/// So many times the replicates that it takes are not worth naming.
-const TOO_MANY: f64 = 1000.0;
+/// What would make smaller what the case's replicates do not.
+fn remedy(verdict: &Verdict) -> String {
+    let largest = verdict.sources().into_iter().next();
+    largest.map_or_else(String::new, |Source { help, .. }| format!("{help}, or move the limit to what matters."))
+}
 
-fn next(verdict: &Verdict) -> String {
+fn next(verdict: &Verdict, family: usize) -> String {
     let at_limit = || {
         "The value lies on the limit as near as it can be told: replicates will not decide. Ask whether the limit is \
          where it should be."
@@ -267,14 +300,16 @@ fn next(verdict: &Verdict) -> String {
                           mark the gate with known_failure and a reason."
                 .to_owned()
         }
-        Outcome::Inconclusive => match (verdict.margin, verdict.detectable) {
-            // Errors fall with the root of the replicates.
-            (Some(margin), Some(d)) if margin != 0.0 && (d / margin).powi(2) < TOO_MANY => format!(
+        Outcome::Inconclusive => match (verdict.margin, verdict.replicates_needed(family)) {
+            (Some(_), Some(times)) => format!(
                 "If the value stays where it is, about {} times the replicates decide; raise replicates in the suite \
                  file, or move the limit to what matters.",
-                number((d / margin).powi(2).max(1.1))
+                number(times)
             ),
-            (Some(_), _) => at_limit(),
+            (Some(_), None) if verdict.is_kept_by_floor(family) => {
+                format!("No number of replicates of the case decides where the value lies: {}", remedy(verdict))
+            }
+            (Some(_), None) => at_limit(),
             (None, _) => "Mend what the reason names: without a value nothing can be decided.".to_owned(),
         },
     }

@@ -6,7 +6,7 @@ use super::{
     judge::{JudgedRegions, contrast_of_means},
     regions::{Region, Regions},
 };
-use crate::stats::{Estimate, Group, jackknife};
+use crate::stats::{Estimate, Group, column_means, jackknife};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -106,8 +106,9 @@ impl Method<'_> {
                 contrast(m[0][0], m[0][1]) - contrast_of_means(&m[1], judge.brighter)
             }))
         });
-        let reading = estimate.as_ref().ok().zip(judge.ok()).and_then(|(e, j)| reading(e, j.contrast().value));
-        let mut metric = Metric::new(MetricName::ContrastError, None, estimate);
+        let of_judge = judge.ok().map(JudgedRegions::contrast);
+        let reading = estimate.as_ref().ok().zip(of_judge).and_then(|(e, j)| reading(e, j.value));
+        let mut metric = Metric::new(MetricName::ContrastError, None, estimate).with_floor(of_judge);
         if metric.value.is_some() {
             metric.note = reading.map(str::to_owned);
         }
@@ -117,21 +118,28 @@ impl Method<'_> {
     /// 1 - max(0, dK) / dK(classic). The two methods share their seeds, so
     /// replicates are paired.
     pub fn removed(&self, classic: &Method<'_>, judge: Result<&JudgedRegions, Absent>) -> Metric {
-        Metric::new(MetricName::Removed, None, judge.and_then(|judge| self.removed_estimate(classic, judge)))
+        let (estimate, of_judge) = judge
+            .and_then(|judge| self.removed_estimates(classic, judge))
+            .map_or_else(|absent| (Err(absent), None), |[estimate, of_judge]| (Ok(estimate), Some(of_judge)));
+        Metric::new(MetricName::Removed, None, estimate).with_floor(of_judge)
     }
 
-    fn removed_estimate(&self, classic: &Method<'_>, judge: &JudgedRegions) -> Result<Estimate, Absent> {
+    /// What is removed, and the same as if the judge alone had an error.
+    fn removed_estimates(&self, classic: &Method<'_>, judge: &JudgedRegions) -> Result<[Estimate; 2], Absent> {
         let error = classic.contrast_error(Ok(judge));
         let clear = error.estimate().is_some_and(|e| e.interval(0.95)[0] > 0.0);
         if !clear {
             return Err(Absent("classic shows no false highlight here, so there is nothing to remove".into()));
         }
         let paired: Group = self.rows()?.into_iter().zip(classic.rows()?).map(|(a, b)| [a, b].concat()).collect();
-        Ok(jackknife(&[paired, judge.means.clone()], |m| {
-            let kq = contrast_of_means(&m[1], judge.brighter);
-            let (method, classic) = (contrast(m[0][0], m[0][1]) - kq, contrast(m[0][2], m[0][3]) - kq);
+        let removed = |own: &[f64], q: &[f64]| {
+            let kq = contrast_of_means(q, judge.brighter);
+            let (method, classic) = (contrast(own[0], own[1]) - kq, contrast(own[2], own[3]) - kq);
             1.0 - method.max(0.0) / classic
-        }))
+        };
+        let own = column_means(&paired);
+        let of_judge = jackknife(std::slice::from_ref(&judge.means), |m| removed(&own, &m[0]));
+        Ok([jackknife(&[paired, judge.means.clone()], |m| removed(&m[0], &m[1])), of_judge])
     }
 }
 

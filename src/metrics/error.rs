@@ -47,12 +47,12 @@ pub fn against_converged(method: &Method<'_>, region: Region) -> [Metric; 3] {
             Ok(finish(sum / pixels.len() as f64))
         })
     };
-    let bias = over_replicates(method.replicates, |_, image| regions.mean(region, image)).and_then(|own| {
-        let converged = over_replicates(&method.converged.replicates, |_, image| regions.mean(region, image))?;
-        Ok(own.less(&converged))
-    });
+    let mean = |images: &[Vec<f32>]| over_replicates(images, |_, image| regions.mean(region, image));
+    let (own, converged) = (mean(method.replicates), mean(&method.converged.replicates));
+    let of_converged = converged.clone().ok();
+    let bias = own.and_then(|own| Ok(own.less(&converged?)));
     [
-        Metric::new(MetricName::Bias, Some(region), bias),
+        Metric::new(MetricName::Bias, Some(region), bias).with_floor(of_converged),
         Metric::new(MetricName::Mae, Some(region), of(f64::abs, |m| m)),
         Metric::new(MetricName::Rmse, Some(region), of(|d| d * d, f64::sqrt)),
     ]
@@ -69,6 +69,7 @@ pub fn against_judge(
     image: &Result<&QImage, Absent>,
     region: Region,
 ) -> [Metric; 3] {
+    let of_judge = q.as_ref().ok().copied();
     let bias = q.and_then(|q| Ok(over_replicates(method.replicates, |_, o| method.regions.mean(region, o))?.less(&q)));
     let of = |f: fn(f64) -> f64, finish: fn(f64) -> f64| {
         let image = image.clone()?;
@@ -83,7 +84,7 @@ pub fn against_judge(
         })
     };
     [
-        Metric::new(MetricName::JudgeBias, Some(region), bias),
+        Metric::new(MetricName::JudgeBias, Some(region), bias).with_floor(of_judge),
         Metric::new(MetricName::JudgeMae, Some(region), of(f64::abs, |m| m)),
         Metric::new(MetricName::JudgeRmse, Some(region), of(|d| d * d, f64::sqrt)),
     ]

@@ -94,6 +94,10 @@ pub struct Metric {
     pub se: Option<f64>,
     /// Degrees of freedom of the standard error.
     pub df: Option<f64>,
+    /// The part of the standard error that does not come from the case's own replicates;
+    /// absent where all of it does.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub floor: Option<Floor>,
     /// Why the value is null, or how a contrast error reads.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub note: Option<String>,
@@ -105,7 +109,15 @@ impl Metric {
         match estimate {
             Ok(e) if e.value.is_finite() => {
                 let finite = |v: f64| v.is_finite().then_some(v);
-                Metric { name, region, value: Some(e.value), se: finite(e.se), df: finite(e.df), note: None }
+                Metric {
+                    name,
+                    region,
+                    value: Some(e.value),
+                    se: finite(e.se),
+                    df: finite(e.df),
+                    floor: None,
+                    note: None,
+                }
             }
             Ok(_) => Self::absent(
                 name,
@@ -117,7 +129,14 @@ impl Metric {
     }
 
     fn absent(name: MetricName, region: Option<Region>, why: &str) -> Self {
-        Metric { name, region, value: None, se: None, df: None, note: Some(why.to_owned()) }
+        Metric { name, region, value: None, se: None, df: None, floor: None, note: Some(why.to_owned()) }
+    }
+
+    /// The same, where a part of the standard error is that of something else than the
+    /// case's replicates.
+    #[must_use]
+    pub fn with_floor(self, part: Option<Estimate>) -> Self {
+        Metric { floor: part.filter(|_| self.value.is_some()).and_then(Floor::of), ..self }
     }
 
     /// Value and standard error, where both are known.
@@ -131,6 +150,26 @@ impl Metric {
             Some(region) => format!("{} over {}", self.name.label(), region.label()),
             None => self.name.label().to_owned(),
         }
+    }
+}
+
+/// The part of a standard error that does not come from a case's own replicates, but from
+/// the judge, the converged image or a base record: however many replicates the case has,
+/// its standard error does not fall below this.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Floor {
+    /// The standard error of that part, above 0.
+    pub se: f64,
+    /// Its degrees of freedom, above 0.
+    pub df: f64,
+}
+
+impl Floor {
+    /// That of an estimate; None where it has no error, or an unknown one.
+    pub fn of(part: Estimate) -> Option<Self> {
+        let is_known = part.se > 0.0 && part.se.is_finite() && part.df > 0.0 && part.df.is_finite();
+        is_known.then_some(Floor { se: part.se, df: part.df })
     }
 }
 

@@ -14,17 +14,20 @@ pub enum End {
     Fail,
     /// The data do not decide a gate.
     Inconclusive,
+    /// The suite has gates, and none of them was held against anything.
+    Nothing,
     /// Every gate passes; those known to fail do.
     Pass,
 }
 
 impl End {
-    /// `INCOMPLETE`, `FAIL`, `INCONCLUSIVE` or `PASS`.
+    /// `INCOMPLETE`, `FAIL`, `INCONCLUSIVE`, `NOTHING JUDGED` or `PASS`.
     pub fn text(self) -> &'static str {
         match self {
             End::Incomplete => "INCOMPLETE",
             End::Fail => "FAIL",
             End::Inconclusive => "INCONCLUSIVE",
+            End::Nothing => "NOTHING JUDGED",
             End::Pass => "PASS",
         }
     }
@@ -40,6 +43,8 @@ impl Record {
             End::Fail
         } else if s.inconclusive > 0 {
             End::Inconclusive
+        } else if self.has_judged_nothing() {
+            End::Nothing
         } else {
             End::Pass
         }

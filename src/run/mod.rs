@@ -237,6 +237,7 @@ impl<'a> Prepared<'a> {
             scenes: &scenes,
             cases: &cases,
             base: plan.base.as_ref(),
+            no_base: plan.no_base,
         };
         let (verdicts, idle_gates) = judge(&evidence);
         Record {
@@ -247,6 +248,7 @@ impl<'a> Prepared<'a> {
             filter: plan.filter.clone(),
             until_sure: end.until_sure,
             incomplete: end.incomplete,
+            no_base: plan.no_base,
             summary: Summary::new(&verdicts, &idle_gates, &scenes, &cases),
             pooled: pooled(&suite, &scenes, &cases),
             verdicts,

@@ -159,6 +159,7 @@ impl Studio<'_> {
             scenes: std::slice::from_ref(&sight.scene),
             cases: &cases,
             base: self.set.plan.base.as_ref(),
+            no_base: self.set.plan.no_base,
         };
         judge(&evidence).0
     }
@@ -172,7 +173,7 @@ impl Studio<'_> {
             let is_broken = decided([p[1], f64::NAN], family, v.spent, alpha);
             let warns = |p: [f64; 2]| decided(p, family, v.spent, alpha);
             let sure = is_broken || decided(p, family, v.spent, alpha) && warning(v).is_none_or(warns);
-            Some(block(self.set.plan, case)).filter(|_| !sure)
+            Some(block(self.set.plan, case)).filter(|_| !sure && v.can_be_decided(family))
         });
         open.collect()
     }

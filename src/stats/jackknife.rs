@@ -7,7 +7,7 @@ use super::{Estimate, mean_variance};
 /// must not.
 pub type Group = Vec<Vec<f64>>;
 
-pub(super) fn column_means(rows: &Group) -> Vec<f64> {
+pub(crate) fn column_means(rows: &Group) -> Vec<f64> {
     let n = rows.len() as f64;
     (0..rows.first().map_or(0, Vec::len)).map(|c| rows.iter().map(|r| r[c]).sum::<f64>() / n).collect()
 }

@@ -25,6 +25,7 @@ pub use bootstrap::{Bca, bca, bca_levels};
 pub use chi_square::{ChiSquare, ChiSquareError, LEAST_EXPECTED, chi_square};
 pub use directions::DirectionHistogram;
 pub use equivalence::{Better, non_inferior, tost};
+pub(crate) use jackknife::column_means;
 pub use jackknife::{Group, jackknife, jackknife_of};
 pub use moments::Moments;
 pub use multiplicity::{benjamini_hochberg, holm, sidak, sidak_alpha};

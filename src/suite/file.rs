@@ -27,7 +27,7 @@ pub struct SuiteFile {
     /// Independent renders of each case; intervals are taken over them.
     pub replicates: Replicates,
     /// Seed of all randomness; `--seed` overrides it.
-    #[serde(default = "one")]
+    #[serde(default = "one", deserialize_with = "seed")]
     pub seed: u32,
     /// Rays of the converged images.
     pub converged_rays: Rays,
@@ -56,6 +56,11 @@ pub struct SuiteFile {
 
 fn one() -> u32 {
     1
+}
+
+fn seed<'de, D: Deserializer<'de>>(d: D) -> Result<u32, D::Error> {
+    let value = i64::deserialize(d)?;
+    u32::try_from(value).map_err(|_| D::Error::custom(format!("seed is {value}: it must be 0 to {}", u32::MAX)))
 }
 
 fn target() -> f64 {

@@ -7,6 +7,7 @@ use crate::{
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
+use std::fmt::Display;
 
 /// The confidences a gate may ask for.
 const CONFIDENCES: std::ops::RangeInclusive<f64> = 0.5..=0.999_999;
@@ -110,15 +111,38 @@ impl LimitFile {
             (Some(v), None, None, None) => Ok(Limit::AtLeast(v)),
             (None, Some(v), None, None) => Ok(Limit::AtMost(v)),
             (None, None, Some(target), Some(within)) if within > 0.0 => Ok(Limit::Equals { target, within }),
-            (None, None, Some(_), Some(_)) => Err("within must be above 0".into()),
-            _ => Err("give exactly one limit: min, max, or equals together with within".into()),
+            (None, None, Some(_), Some(within)) => Err(format!("within is {within}: it must be above 0")),
+            _ => Err(format!("give exactly one limit: min, max, or equals together with within; {}", self.given())),
         }
+    }
+
+    /// Which of its options are there.
+    fn given(&self) -> String {
+        let options = [("min", self.min), ("max", self.max), ("equals", self.equals), ("within", self.within)];
+        let given: Vec<&str> = options.iter().filter(|(_, value)| value.is_some()).map(|(name, _)| *name).collect();
+        match given.as_slice() {
+            [] => "none of them is given".to_owned(),
+            [one] => format!("{one} alone is given"),
+            [most @ .., last] => format!("{} and {last} are given", most.join(", ")),
+        }
+    }
+}
+
+/// Refuses a list that names something twice.
+pub(super) fn once<T: PartialEq + Display>(field: &str, list: &[T]) -> Result<(), String> {
+    match (1..list.len()).find(|&i| list[..i].contains(&list[i])) {
+        Some(i) => Err(format!("{field} names {} twice", list[i])),
+        None => Ok(()),
     }
 }
 
 impl GateFile {
     /// The gate of a suite that has these methods, `classic` among them.
     pub(super) fn build(&self, methods: &[Method]) -> Result<Gate, String> {
+        if self.name.trim().is_empty() {
+            return Err("name is empty: it must say what the gate makes sure of".into());
+        }
+        self.check_filters()?;
         let GateFile { min, max, equals, within, .. } = *self;
         let limit = LimitFile { min, max, equals, within }.build()?;
         let warn = self.warn.map(LimitFile::build).transpose().map_err(|e| format!("warn: {e}"))?;
@@ -150,6 +174,16 @@ impl GateFile {
             rays: self.rays.iter().map(|r| r.get()).collect(),
             known_failure: self.known_failure.clone(),
         })
+    }
+
+    /// What stands in a filter twice is a slip: perhaps another was meant.
+    fn check_filters(&self) -> Result<(), String> {
+        for (filter, list) in
+            [("scenes", &self.scenes), ("estimators", &self.estimators), ("renderers", &self.renderers)]
+        {
+            once(filter, list)?;
+        }
+        once("rays", &self.rays.iter().map(|r| r.get()).collect::<Vec<_>>())
     }
 
     fn check_metric(&self) -> Result<(), String> {

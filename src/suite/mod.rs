@@ -138,7 +138,7 @@ impl Suite {
             let scene = if scene.ends_with(".toml") {
                 Scene::from_file(&folder.join(scene))?
             } else {
-                aogauge_scenes::library::scene(scene)?
+                aogauge_scenes::library::scene(scene).map_err(|e| invalid(format!("scenes: {e}")))?
             };
             if scenes.iter().any(|s| s.name == scene.name) {
                 return Err(invalid(format!("scenes: '{}' is named twice", scene.name)));
@@ -184,6 +184,7 @@ impl Suite {
             None => Ok(()),
         };
         if let Some(marked) = &parsed.software_adapter {
+            gate::once("scenes", &marked.scenes).map_err(|e| invalid(format!("software_adapter: {e}")))?;
             names("software_adapter", &marked.scenes, &mut scenes.iter().map(|s| s.name.as_str()), "scenes")?;
             traced("software_adapter", &marked.rays)?;
         }
@@ -284,6 +285,15 @@ mod tests {
         assert_eq!(with(&gate("max = 1")).unwrap().gates[0].confidence, 0.95);
     }
 
+    /// Of a scene that is not there the suite file and the field are named.
+    #[test]
+    fn an_unknown_scene_is_named_with_the_file_that_names_it() {
+        let text = "description = 'x'\nscenes = ['plan']\nrays = [4]\nreplicates = 4\nconverged_rays = 64\n\
+                    [[estimator]]\nname = 'classic'\nkind = 'classic'\n";
+        let message = Suite::from_toml("x", "x.toml", text, Path::new(".")).unwrap_err().to_string();
+        assert!(message.starts_with("x.toml: scenes: no built-in scene is called 'plan'; there are: "), "{message}");
+    }
+
     #[test]
     fn what_is_wrong_is_named() {
         assert_eq!(with("").unwrap().file.target_rmse, 0.01);
@@ -293,6 +303,9 @@ mod tests {
             ("name = ''", "name: '' is not a legal name"),
             ("name = '../x'", "name: '../x' is not a legal name"),
             ("name = 'a # b'", "legal name"),
+            ("seed = -1", "seed is -1: it must be 0 to 4294967295"),
+            ("seed = 4294967296", "seed is 4294967296: it must be 0 to"),
+            ("seed = 1.5", "line 6"),
             ("golden_rays = 0", "line 6"),
             ("golden_rays = 5", "not among rays"),
             ("target_rmse = 0", "target_rmse is 0: it must be 1e-6 to 1"),
@@ -307,7 +320,19 @@ mod tests {
             ("[[gate]]\nname = 'g'\nmetric = 'judge-mae'\nregion = 'left'\nmax = 0.5", "judge-mae is reported but"),
             ("[[gate]]\nname = 'g'\nmetric = 'judge-rmse'\nregion = 'left'\nmax = 0.5", "judge-rmse is reported but"),
             ("[[gate]]\nname = 'g'\nmetric = 'removed'\nmin = nan", "finite"),
-            (&gate("max = 0.5\nmin = 0.1"), "exactly one limit"),
+            (&gate("max = 0.5\nmin = 0.1"), "exactly one limit: min, max, or equals together with within; min and max"),
+            (&gate(""), "none of them is given"),
+            (&gate("equals = 0.5"), "equals alone is given"),
+            (&gate("within = 0.5"), "within alone is given"),
+            (&gate("max = 0.5\nequals = 0\nwithin = 1"), "max, equals and within are given"),
+            (&gate("equals = 0\nwithin = -1"), "gate 'g': within is -1: it must be above 0"),
+            (&gate("equals = 0\nwithin = 0"), "within is 0: it must be above 0"),
+            (&gate("max = 0.5\nscenes = ['plane', 'plane']"), "gate 'g': scenes names plane twice"),
+            (&gate("max = 0.5\nestimators = ['classic', 'classic']"), "estimators names classic twice"),
+            (&gate("max = 0.5\nrenderers = ['cpu', 'gpu', 'cpu']"), "renderers names cpu twice"),
+            (&gate("max = 0.5\nrays = [4, 4]"), "rays names 4 twice"),
+            ("[[gate]]\nname = ' '\nmetric = 'contrast'\nmax = 1", "name is empty: it must say what"),
+            ("software_adapter = { scenes = ['plane', 'plane'] }", "software_adapter: scenes names plane twice"),
             (&gate("max = 0.5\nconfidence = 1.0"), "confidence is 1: it must be 0.5 to 0.999999"),
             (&gate("max = 0.5\nconfidence = 0.4"), "0.5 to 0.999999"),
             (&gate("max = 0.5\nconfidence = nan"), "0.5 to 0.999999"),

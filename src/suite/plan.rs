@@ -57,6 +57,8 @@ pub struct Plan<'a> {
     pub until_sure: Option<u32>,
     /// The record that gates `against = "base"` are held against; None leaves them idle.
     pub base: Option<Record>,
+    /// Whether there is none on purpose. Else such gates make a run without one inconclusive.
+    pub no_base: bool,
 }
 
 impl<'a> Plan<'a> {
@@ -100,6 +102,7 @@ impl<'a> Plan<'a> {
             filter: None,
             until_sure: None,
             base: None,
+            no_base: false,
         }
     }
 

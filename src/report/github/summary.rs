@@ -47,7 +47,7 @@ pub fn summary(record: &Record, images: Option<&ImageBase>, room: usize) -> Opti
 fn head(record: &Record) -> String {
     let sign = match record.end() {
         End::Pass => "✅",
-        End::Inconclusive => "⚠️",
+        End::Inconclusive | End::Nothing => "⚠️",
         End::Fail | End::Incomplete => "❌",
     };
     let machine = &record.machine;

@@ -8,7 +8,7 @@ use super::super::{
 use crate::{
     gate::{CONFIDENCE, Outcome, Verdict},
     layers::Layers,
-    record::{CaseRecord, Record, SceneRecord},
+    record::{CaseRecord, End, Record, SceneRecord},
     viewer::{GateRow, Item, Pair, Plot, SceneNote, VerdictRow},
 };
 
@@ -32,17 +32,12 @@ fn class(outcome: Outcome) -> &'static str {
 
 /// What the whole run came to.
 pub(super) fn overall(record: &Record) -> &'static str {
-    let s = &record.summary;
-    if s.failed_cases + s.failed_judges > 0 || record.incomplete.is_some() {
-        "error"
-    } else if s.fail > 0 {
-        "fail"
-    } else if s.inconclusive > 0 {
-        "inconclusive"
-    } else if s.warnings > 0 {
-        "warn"
-    } else {
-        "pass"
+    match record.end() {
+        End::Incomplete => "error",
+        End::Fail => "fail",
+        End::Inconclusive | End::Nothing => "inconclusive",
+        End::Pass if record.summary.warnings > 0 => "warn",
+        End::Pass => "pass",
     }
 }
 

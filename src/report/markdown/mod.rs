@@ -22,7 +22,7 @@ use crate::{
     disk::DiskError,
     gate::{CONFIDENCE, Outcome},
     metrics::Metric,
-    record::{Record, pictures},
+    record::{End, Record, pictures},
     untrusted,
 };
 use attention::Attention;
@@ -117,20 +117,16 @@ pub(super) fn show(metric: Option<&Metric>) -> String {
     estimate.map_or_else(|| "–".to_owned(), |e| plus_minus(e.value, e.interval(CONFIDENCE)))
 }
 
-/// What a run came to, worst first.
+/// What a run came to, and its sign.
 fn headline(record: &Record) -> (&'static str, &'static str) {
-    let summary = &record.summary;
-    let is_cut = record.incomplete.is_some() || summary.failed_cases + summary.failed_judges > 0;
-    let outcome = if is_cut {
-        return ("INCOMPLETE", "⛔");
-    } else if summary.fail > 0 {
-        Outcome::Fail
-    } else if summary.inconclusive > 0 {
-        Outcome::Inconclusive
-    } else {
-        Outcome::Pass
+    let end = record.end();
+    let sign = match end {
+        End::Incomplete => "⛔",
+        End::Fail => sign(Outcome::Fail),
+        End::Inconclusive | End::Nothing => sign(Outcome::Inconclusive),
+        End::Pass => sign(Outcome::Pass),
     };
-    (outcome_text(outcome), sign(outcome))
+    (end.text(), sign)
 }
 
 /// Over how many replicates numbers are taken.
