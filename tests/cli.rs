@@ -465,6 +465,8 @@ fn goldens_are_approved_and_verified() {
     for v in layers.layers.get_mut("mean").unwrap() {
         *v -= 0.1;
     }
+    let hash = aogauge::layers::pixel_hash(&layers.layers["mean"]);
+    layers.attributes.insert("pixel-hash".into(), hash);
     layers.write(&golden).unwrap();
     let stderr = verify(1, &fresh);
     assert!(stderr.contains("DIFFERENT") && stderr.contains("9 of 2057 tests reject"), "{stderr}");

@@ -3,7 +3,7 @@
 
 #![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
 
-use aogauge::layers::Layers;
+use aogauge::layers::{Layers, pixel_hash};
 use serde_json::{Value, json};
 use std::{
     collections::BTreeSet,
@@ -114,12 +114,16 @@ fn with_cases(out: &Path, to: &Path, n: usize) {
     });
 }
 
+/// Changes an image; of a golden its hash too, as if it had been approved so.
 fn mean(path: &Path, change: impl Fn(usize, f32) -> f32) {
     let mut layers = Layers::read(path).unwrap();
     for (name, values) in &mut layers.layers {
         if name == "mean" || name.starts_with("replicate-") {
             values.iter_mut().enumerate().for_each(|(i, v)| *v = change(i, *v));
         }
+    }
+    if let Some(hash) = layers.attributes.get_mut("pixel-hash") {
+        *hash = pixel_hash(&layers.layers["mean"]);
     }
     layers.write(path).unwrap();
 }
@@ -465,6 +469,22 @@ fn a_git_lfs_pointer_is_named() {
     // Given up by name, it can be approved.
     expect(0, &["golden", "remove", "scene/classic.4", "--goldens", text(&goldens)]);
     expect(0, &["golden", "approve", text(&RUNS.out[1]), "--goldens", text(&goldens), "--reason", "new"]);
+}
+
+#[test]
+fn a_golden_whose_pixels_were_changed_is_unusable() {
+    let dir = tempfile::tempdir().unwrap();
+    let goldens = dir.path().join("goldens");
+    expect(0, &["golden", "approve", text(&RUNS.out[0]), "--goldens", text(&goldens), "--reason", "r"]);
+    let golden = goldens.join("scene/classic.4.exr");
+    let mut layers = Layers::read(&golden).unwrap();
+    let approved = layers.attributes["pixel-hash"].clone();
+    layers.layers.get_mut("mean").unwrap()[77] += 0.25;
+    layers.write(&golden).unwrap();
+    let printed = expect(3, &["golden", "verify", text(&RUNS.out[0]), "--goldens", text(&goldens)]);
+    assert!(printed.contains("UNUSABLE") && printed.contains(&approved), "{printed}");
+    assert!(printed.contains("not those that were approved") && printed.contains("1 missing or unusable"), "{printed}");
+    assert!(expect(3, &["golden", "list", "--goldens", text(&goldens)]).contains("1 cannot be read"));
 }
 
 #[test]
