@@ -201,6 +201,14 @@ pub fn srgb(v: f32) -> u8 {
     (encoded * 255.0).round() as u8
 }
 
+/// The linear light of an sRGB code from 0 to 1, by IEC 61966-2-1; beyond that range by
+/// the same curve, of negative codes mirrored.
+pub fn linear(code: f32) -> f32 {
+    let v = code.abs();
+    let linear = if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
+    linear.copysign(code)
+}
+
 /// Writes an 8-bit RGB PNG.
 ///
 /// # Errors
