@@ -33,9 +33,16 @@ fn prepared() -> (TempDir, PathBuf, Record, Store) {
         fs::copy(out.join(one.image.as_ref().unwrap()), out.join(case.image.as_ref().unwrap())).unwrap();
     }
     let store = Store::new(&dir.path().join("goldens"));
-    let approval =
-        Approval { reason: "bench", only: Selection::Containing(""), renderer: "cpu", name: None, limits: None };
-    store.approve(&out, &record, &approval, &|| ()).unwrap();
+    let approval = Approval {
+        reason: "bench",
+        only: Selection::Containing(""),
+        renderer: "cpu",
+        name: None,
+        limits: None,
+        most: None,
+        dry_run: false,
+    };
+    store.approve(&out, &record, &approval, &|_| ()).unwrap();
     (dir, out, record, store)
 }
 

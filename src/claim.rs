@@ -1,7 +1,7 @@
 //! What the header of an image file may claim, before memory is taken for it.
 
 use crate::disk::DiskError;
-use exr::prelude::MetaData;
+use exr::{meta::header::Header, prelude::MetaData};
 use std::{io::Cursor, path::Path};
 
 /// What a file and what decoding it may take, bytes: two 16-bit RGB images of
@@ -22,26 +22,36 @@ pub(crate) fn most(length: usize) -> u64 {
     (length as u64).saturating_mul(MAX_RATIO).clamp(ALWAYS, MAX_BYTES)
 }
 
+/// Bytes that decoding a part takes, as floats of 32 bits. In 128 bits: sides and
+/// channels come from the file.
+fn bytes_of(header: &Header) -> u128 {
+    let [width, height] = [header.layer_size.0 as u128, header.layer_size.1 as u128];
+    // Samples of 16 bits become 32.
+    let pixel = header.channels.bytes_per_pixel.max(4 * header.channels.list.len());
+    (width * height).saturating_mul(pixel as u128)
+}
+
+/// Bytes that decoding a file takes whose headers are these.
+pub(crate) fn of_exr(meta: &MetaData) -> u128 {
+    meta.headers.iter().fold(0u128, |sum, header| sum.saturating_add(bytes_of(header)))
+}
+
 /// Reads the headers of an OpenEXR file, and refuses what decoding would take too much
 /// memory for, as floats of 32 bits, and what cannot be read.
 pub(crate) fn exr(path: &Path, bytes: &[u8]) -> Result<MetaData, DiskError> {
     let broken = |e| DiskError::content(path, format!("not a readable OpenEXR image: {e}"));
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(broken)?;
-    // In 128 bits: sides and channels come from the file.
-    let mut claimed = 0u128;
     for header in &meta.headers {
         if header.deep {
             return Err(DiskError::content(path, "deep OpenEXR images cannot be read: flatten them"));
         }
-        let [width, height] = [header.layer_size.0 as u128, header.layer_size.1 as u128];
-        if width.max(height) > u128::from(MAX_SIDE) {
+        let [width, height] = [header.layer_size.0, header.layer_size.1];
+        if width.max(height) > MAX_SIDE as usize {
             let why = format!("the header claims {width} x {height} pixels, at most {MAX_SIDE} a side can be read");
             return Err(DiskError::content(path, why));
         }
-        // Samples of 16 bits become 32.
-        let pixel = header.channels.bytes_per_pixel.max(4 * header.channels.list.len());
-        claimed = claimed.saturating_add((width * height).saturating_mul(pixel as u128));
     }
+    let claimed = of_exr(&meta);
     let most = most(bytes.len());
     if claimed > u128::from(most) {
         let length = bytes.len();

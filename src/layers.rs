@@ -60,6 +60,15 @@ impl Layers {
     /// # Errors
     /// Where the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), DiskError> {
+        let bytes = self.to_bytes().map_err(DiskError::io(path, "write the file"))?;
+        write_whole(path, |buffer| io::Write::write_all(buffer, &bytes))
+    }
+
+    /// The bytes of the file that [`Layers::write`] writes.
+    ///
+    /// # Errors
+    /// Where they are no image: no layers, or values that do not fit the resolution.
+    pub fn to_bytes(&self) -> io::Result<Vec<u8>> {
         let size = Vec2(self.resolution[0] as usize, self.resolution[1] as usize);
         let channels = self
             .layers
@@ -75,11 +84,9 @@ impl Layers {
             attributes.other.insert(Text::from(ATTRIBUTE), AttributeValue::Text(text));
         }
         let layer = Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, AnyChannels::sort(channels));
-        write_whole(path, |buffer| {
-            let mut bytes = io::Cursor::new(Vec::new());
-            Image::from_layer(layer).write().non_parallel().to_buffered(&mut bytes).map_err(io::Error::other)?;
-            io::Write::write_all(buffer, bytes.get_ref())
-        })
+        let mut bytes = io::Cursor::new(Vec::new());
+        Image::from_layer(layer).write().non_parallel().to_buffered(&mut bytes).map_err(io::Error::other)?;
+        Ok(bytes.into_inner())
     }
 
     /// Reads a file that [`Layers::write`] wrote.
@@ -124,6 +131,15 @@ impl Layers {
     }
 }
 
+/// How the file begins that Git LFS leaves in an image's place.
+const POINTER: &[u8] = b"version https://git-lfs";
+
+/// Whether Git LFS has left a pointer in a file's place.
+pub fn is_pointer(path: &Path) -> bool {
+    let mut begin = [0; POINTER.len()];
+    File::open(path).and_then(|mut f| f.read_exact(&mut begin)).is_ok() && begin == POINTER
+}
+
 /// The bytes of an image file.
 ///
 /// # Errors
@@ -141,7 +157,7 @@ pub fn load(path: &Path) -> Result<Vec<u8>, DiskError> {
             format!("more than {MAX_BYTES} bytes, which is the most an image may have"),
         ));
     }
-    if bytes.starts_with(b"version https://git-lfs") {
+    if bytes.starts_with(POINTER) {
         return Err(DiskError::content(path, "this is a Git LFS pointer, not the image: run `git lfs pull`"));
     }
     Ok(bytes)
@@ -183,6 +199,14 @@ pub fn srgb(v: f32) -> u8 {
     let v = v.clamp(0.0, 1.0);
     let encoded = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
     (encoded * 255.0).round() as u8
+}
+
+/// The linear light of an sRGB code from 0 to 1, by IEC 61966-2-1; beyond that range by
+/// the same curve, of negative codes mirrored.
+pub fn linear(code: f32) -> f32 {
+    let v = code.abs();
+    let linear = if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
+    linear.copysign(code)
 }
 
 /// Writes an 8-bit RGB PNG.

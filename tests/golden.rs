@@ -3,7 +3,7 @@
 
 #![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
 
-use aogauge::layers::Layers;
+use aogauge::layers::{Layers, pixel_hash};
 use serde_json::{Value, json};
 use std::{
     collections::BTreeSet,
@@ -46,12 +46,12 @@ fn aogauge(args: &[&str]) -> Output {
     command(args).output().unwrap()
 }
 
-/// Runs, checks the exit code and returns standard error.
+/// Runs, checks the exit code and returns all that is printed.
 fn expect(code: i32, args: &[&str]) -> String {
     let output = aogauge(args);
-    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    let [stderr, stdout] = [output.stderr, output.stdout].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     assert_eq!(output.status.code(), Some(code), "aogauge {args:?}\n{stderr}");
-    stderr
+    stderr + &stdout
 }
 
 fn stdout(args: &[&str]) -> String {
@@ -114,12 +114,16 @@ fn with_cases(out: &Path, to: &Path, n: usize) {
     });
 }
 
+/// Changes an image; of a golden its hash too, as if it had been approved so.
 fn mean(path: &Path, change: impl Fn(usize, f32) -> f32) {
     let mut layers = Layers::read(path).unwrap();
     for (name, values) in &mut layers.layers {
         if name == "mean" || name.starts_with("replicate-") {
             values.iter_mut().enumerate().for_each(|(i, v)| *v = change(i, *v));
         }
+    }
+    if let Some(hash) = layers.attributes.get_mut("pixel-hash") {
+        *hash = pixel_hash(&layers.layers["mean"]);
     }
     layers.write(path).unwrap();
 }
@@ -239,6 +243,10 @@ fn goldens_are_listed_sized_and_pruned() {
     let goldens = dir.path().join("goldens");
     let golden = |code: i32, args: &[&str]| expect(code, &[&["golden"], args, &["--goldens", text(&goldens)]].concat());
     let (out, suite) = (text(&RUNS.out[0]), text(&RUNS.suite));
+    for verb in [&["list"][..], &["size"], &["size", "--limit", "1MB"]] {
+        assert!(golden(3, verb).contains("there is no folder of goldens"), "{verb:?}");
+    }
+    fs::create_dir(&goldens).unwrap();
     assert!(golden(4, &["list"]).contains("no golden"));
     golden(0, &["approve", out, "--reason", "größer"]);
     golden(0, &["approve", out, "--reason", "b", "--as", "b", "--only", "classic"]);
@@ -249,8 +257,9 @@ fn goldens_are_listed_sized_and_pruned() {
     let all = &all["goldens"];
     assert_eq!(all.as_array().unwrap().len(), 3);
     assert_eq!(all[1]["name"], "b");
-    assert_eq!(all[0]["golden"]["Ok"]["seed"], 1);
-    assert_eq!(all[0]["golden"]["Ok"]["resolution"], json!([64, 32]));
+    assert_eq!(all[0]["golden"]["seed"], 1);
+    assert_eq!(all[0]["golden"]["resolution"], json!([64, 32]));
+    assert_eq!(all[0]["unreadable"], json!(null));
 
     golden(0, &["size", "--limit", "1MB"]);
     assert!(golden(1, &["size", "--limit", "5kB"]).contains("more than 5.0 kB"));
@@ -262,6 +271,10 @@ fn goldens_are_listed_sized_and_pruned() {
     pointer(&goldens.join("scene/classic.4.exr"));
     assert!(golden(3, &["list"]).contains("1 cannot be read"));
     assert!(stdout(&["golden", "list", "--goldens", text(&goldens)]).contains("Git LFS pointer"));
+    let all = stdout(&["golden", "list", "--goldens", text(&goldens), "--format", "json"]);
+    let broken = serde_json::from_str::<Value>(&all).unwrap()["goldens"][0].take();
+    assert_eq!(broken["golden"], json!(null));
+    assert!(broken["unreadable"].as_str().unwrap().contains("git lfs pull"), "{broken}");
 
     // What no case names goes; what did not run stays.
     fs::create_dir(goldens.join("gone")).unwrap();
@@ -419,14 +432,14 @@ fn what_is_printed_has_a_version_and_a_schema() {
     for verb in [&["verify", out][..], &["list"], &["size"]] {
         let args = [&["golden"], verb, &["--goldens", goldens, "--format", "json"]].concat();
         let printed: Value = serde_json::from_str(&stdout(&args)).unwrap();
-        assert_eq!(printed["version"], 1, "{verb:?}");
+        assert_eq!(printed["version"], 2, "{verb:?}");
         let schema: Value = serde_json::from_str(&stdout(&["schema", &format!("golden-{}", verb[0])])).unwrap();
         assert_eq!(keys(&schema["properties"]), keys(&printed), "{verb:?}");
         let parts = match verb[0] {
             "verify" => {
                 vec![("Checked", &printed["cases"][0]), ("Comparison", &printed["cases"][0]["verdict"]["compared"])]
             }
-            "list" => vec![("Entry", &printed["goldens"][0]), ("About", &printed["goldens"][0]["golden"]["Ok"])],
+            "list" => vec![("Entry", &printed["goldens"][0]), ("About", &printed["goldens"][0]["golden"])],
             _ => vec![],
         };
         for (name, part) in parts {
@@ -443,6 +456,117 @@ fn a_git_lfs_pointer_is_named() {
     pointer(&goldens.join("scene/classic.4.exr"));
     let stderr = expect(3, &["golden", "verify", text(&RUNS.out[0]), "--goldens", text(&goldens)]);
     assert!(stderr.contains("UNUSABLE") && stderr.contains("git lfs pull"), "{stderr}");
+    // What the pointer stands for nobody knows: it is not written over.
+    let before = fs::read(goldens.join("scene/denoised.4.exr")).unwrap();
+    for more in [&[][..], &["--dry-run"]] {
+        let args = ["golden", "approve", text(&RUNS.out[1]), "--goldens", text(&goldens), "--reason", "new"];
+        let stderr = expect(3, &[&args[..], more].concat());
+        assert!(stderr.contains("classic.4.exr") && stderr.contains("git lfs pull"), "{stderr}");
+        assert!(stderr.contains("nothing is approved"), "{stderr}");
+    }
+    assert!(fs::read(goldens.join("scene/classic.4.exr")).unwrap().starts_with(b"version"));
+    assert!(fs::read(goldens.join("scene/denoised.4.exr")).unwrap() == before);
+    // Given up by name, it can be approved.
+    expect(0, &["golden", "remove", "scene/classic.4", "--goldens", text(&goldens)]);
+    expect(0, &["golden", "approve", text(&RUNS.out[1]), "--goldens", text(&goldens), "--reason", "new"]);
+}
+
+#[test]
+fn a_golden_whose_pixels_were_changed_is_unusable() {
+    let dir = tempfile::tempdir().unwrap();
+    let goldens = dir.path().join("goldens");
+    expect(0, &["golden", "approve", text(&RUNS.out[0]), "--goldens", text(&goldens), "--reason", "r"]);
+    let golden = goldens.join("scene/classic.4.exr");
+    let mut layers = Layers::read(&golden).unwrap();
+    let approved = layers.attributes["pixel-hash"].clone();
+    layers.layers.get_mut("mean").unwrap()[77] += 0.25;
+    layers.write(&golden).unwrap();
+    let printed = expect(3, &["golden", "verify", text(&RUNS.out[0]), "--goldens", text(&goldens)]);
+    assert!(printed.contains("UNUSABLE") && printed.contains(&approved), "{printed}");
+    assert!(printed.contains("not those that were approved") && printed.contains("1 missing or unusable"), "{printed}");
+    assert!(expect(3, &["golden", "list", "--goldens", text(&goldens)]).contains("1 cannot be read"));
+}
+
+#[test]
+fn verdicts_are_results_and_go_to_standard_output() {
+    let dir = tempfile::tempdir().unwrap();
+    let goldens = dir.path().join("goldens");
+    expect(0, &["golden", "approve", text(&RUNS.out[0]), "--goldens", text(&goldens), "--reason", "r"]);
+    let args = ["golden", "verify", text(&RUNS.out[0]), "--goldens", text(&goldens)];
+    let output = aogauge(&args);
+    let printed = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(printed.lines().filter(|l| l.contains("identical  to the last bit")).count(), 2, "{printed}");
+    assert!(printed.ends_with("family error 0.01\n"), "{printed}");
+    assert_eq!(String::from_utf8(output.stderr).unwrap(), "");
+}
+
+#[test]
+fn growth_is_told_and_refused_before_it_happens() {
+    let dir = tempfile::tempdir().unwrap();
+    let goldens = dir.path().join("goldens");
+    let approve = |code: i32, more: &[&str]| {
+        let base = ["golden", "approve", text(&RUNS.out[0]), "--goldens", text(&goldens), "--reason", "r"];
+        expect(code, &[&base[..], more].concat())
+    };
+    let printed = approve(0, &["--dry-run"]);
+    assert!(printed.contains("2 goldens would be approved: r; the store would hold "), "{printed}");
+    assert!(printed.contains("scene/classic.4.exr") && printed.contains("kB more than before"), "{printed}");
+    for more in [&["--limit", "5kB"][..], &["--limit", "5kB", "--dry-run"]] {
+        let printed = approve(1, more);
+        assert!(printed.contains("the store holds 0 B and would hold "), "{printed}");
+        assert!(printed.contains("more than 5.0 kB; nothing is approved"), "{printed}");
+    }
+    assert!(!goldens.join("scene").exists());
+    assert!(approve(2, &["--limit", "5 parsecs"]).contains("MiB"));
+    approve(0, &["--limit", "1MB"]);
+    // What is replaced does not count twice.
+    let total = fs::read_dir(goldens.join("scene")).unwrap().map(|e| e.unwrap().metadata().unwrap().len());
+    let total = total.sum::<u64>().to_string();
+    assert!(approve(0, &["--limit", &total]).contains(" 0 B more than before"));
+}
+
+/// An approval that ends in the middle of its files, as a kill may: here a folder stands
+/// in the way of the fifth. Then `git checkout` restores the old ones.
+#[test]
+fn an_interrupted_approval_stays_whole_whatever_is_restored() {
+    let (dir, n) = (tempfile::tempdir().unwrap(), 9);
+    let (goldens, many, old) = (dir.path().join("goldens"), dir.path().join("many"), dir.path().join("old"));
+    with_cases(&RUNS.out[0], &many, n);
+    assert!(approving(&many, &goldens, "old").wait().unwrap().success());
+    copied(&goldens.join("scene"), &old);
+    let raw = || {
+        let reason = |i| Layers::read(&goldens.join(format!("scene/e{i}.4.exr"))).unwrap().attributes["reason"].clone();
+        (0..n).map(reason).collect::<Vec<_>>()
+    };
+    let blocked = goldens.join("scene/e4.4.exr");
+    fs::remove_file(&blocked).unwrap();
+    fs::create_dir_all(blocked.join("in the way")).unwrap();
+    assert!(!approving(&many, &goldens, "new").wait().unwrap().success());
+    fs::remove_dir_all(&blocked).unwrap();
+    fs::copy(old.join("e4.4.exr"), &blocked).unwrap();
+    let mixture: BTreeSet<String> = raw().into_iter().collect();
+    assert_eq!(mixture.len(), 2, "the files themselves are a mixture");
+    assert_eq!(reasons(&goldens, n), ["new".to_owned()].into());
+    copied(&old, &goldens.join("scene"));
+    assert_eq!(raw(), ["old"; 9]);
+    assert_eq!(reasons(&goldens, n), ["new".to_owned()].into(), "restored files change nothing");
+
+    let told = "a change of the goldens was decided and then interrupted";
+    let (goldens_text, suite) = (text(&goldens), text(&RUNS.suite));
+    for verb in [&["verify", text(&many)][..], &["list"], &["size"], &["prune", suite, "--dry-run"]] {
+        let printed = expect(0, &[&["golden"], verb, &["--goldens", goldens_text]].concat());
+        assert!(printed.contains(told) && printed.contains("git status"), "{verb:?}: {printed}");
+    }
+    fs::write(goldens.join(".approval/.aogauge-half.part"), "half").unwrap();
+    let printed = expect(3, &["golden", "remove", "a/b.4", "--goldens", goldens_text]);
+    assert!(printed.contains("it is finished now: 9 goldens put in place, 0 removed"), "{printed}");
+    assert_eq!(raw(), ["new"; 9]);
+    let left: BTreeSet<_> = fs::read_dir(goldens.join(".approval"))
+        .unwrap()
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
+    assert_eq!(left, [".gitignore".to_owned(), "lock".to_owned()].into());
+    assert!(!expect(0, &["golden", "verify", text(&many), "--goldens", goldens_text]).contains(told));
 }
 
 #[test]
@@ -554,7 +678,7 @@ fn reasons(goldens: &Path, n: usize) -> BTreeSet<String> {
     let list: Value = serde_json::from_str(&list).unwrap();
     let list = &list["goldens"];
     assert_eq!(list.as_array().unwrap().len(), n);
-    list.as_array().unwrap().iter().map(|e| e["golden"]["Ok"]["reason"].as_str().unwrap().to_owned()).collect()
+    list.as_array().unwrap().iter().map(|e| e["golden"]["reason"].as_str().unwrap().to_owned()).collect()
 }
 
 fn approving(out: &Path, goldens: &Path, reason: &str) -> Child {

@@ -2,6 +2,7 @@
 
 #![allow(missing_docs, clippy::unwrap_used)]
 
+use aogauge::golden::{GoldenError, Goldens, Held, Picture, Sampled, Tolerance};
 use std::process::Command;
 
 /// Not a test of its own: an assertion in somebody's test, run by the one below.
@@ -10,7 +11,7 @@ use std::process::Command;
 fn somebodys_assertion() {
     let red = std::env::var("RED").unwrap().parse().unwrap();
     let image = aogauge::golden::RgbImage::from_pixel(8, 8, [red, 0, 0].into());
-    aogauge::golden::assert_golden("somebodys", image, aogauge::golden::Tolerance::Exact);
+    aogauge::golden::assert_golden("somebodys", image, Tolerance::Exact);
 }
 
 #[test]
@@ -60,4 +61,32 @@ fn assertions_obey_the_environment() {
     let (passed, stderr) = assertion("10", &[]);
     assert!(!passed && stderr.contains("64 of 64 pixels differ"), "{stderr}");
     assert!(failures.join("somebodys.difference.png").exists());
+}
+
+/// Replicates of 48 x 32 pixels, noise of a range around one half.
+fn noisy(seed: u32, replicates: usize, range: f32) -> Picture {
+    let mut x = seed;
+    let mut value = || {
+        x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        0.5 + range * ((x >> 8) as f32 / 16_777_216.0 - 0.5)
+    };
+    let images: Vec<Vec<f32>> = (0..replicates).map(|_| (0..48 * 32).map(|_| value()).collect()).collect();
+    let images: Vec<&[f32]> = images.iter().map(Vec::as_slice).collect();
+    Sampled::of_replicates([48, 32], &images).into()
+}
+
+/// An image that is too noisy to tell is not held: nothing was shown of it.
+#[test]
+fn a_sample_that_shows_nothing_is_no_pass() {
+    let dir = tempfile::tempdir().unwrap();
+    let plain = Goldens { folder: dir.path().join("g"), failures: dir.path().join("f"), bless: false, ci: None };
+    let tolerance = Tolerance::Sampled { alpha: 0.01 };
+    let bless = Goldens { bless: true, ..plain.clone() };
+    bless.check("blind", &noisy(1, 2, 1.0), &tolerance).unwrap();
+    bless.check("sees", &noisy(1, 8, 0.2), &tolerance).unwrap();
+    let error = plain.check("blind", &noisy(2, 2, 1.0), &tolerance).unwrap_err();
+    assert!(matches!(error, GoldenError::Differs { .. }), "{error}");
+    let error = error.to_string();
+    assert!(error.contains("BLIND") && error.contains("take more rays or replicates"), "{error}");
+    assert_eq!(plain.check("sees", &noisy(2, 8, 0.2), &tolerance).unwrap(), Held::Held);
 }

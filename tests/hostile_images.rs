@@ -4,6 +4,7 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use aogauge::{
+    compare::{Mask, Mode, Settings, compare},
     layers::Layers,
     picture::read::{self, LayerChoice},
 };
@@ -168,9 +169,44 @@ fn liars_take_no_memory_and_honest_images_are_read() {
         // As stored, and as floats.
         assert!(bytes.len() < 1 << 19 && took < 2 * ALWAYS, "{name} took {took}");
         drop(found);
-        // The JPEG decoder takes a file cut short for grey below.
         let (any, took) = read_all_ways(Path::new(name), &bytes[..bytes.len() / 2]);
-        assert!(any == (name == "grey.jpg") && took < ALWAYS, "{name}, half of it, took {took}");
+        assert!(!any && took < ALWAYS, "{name}, half of it, took {took}");
+    }
+    pairs_are_refused_by_their_headers();
+}
+
+/// Sizes that differ, and images that are too large together, before any is decoded.
+fn pairs_are_refused_by_their_headers() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for (name, bytes) in flat() {
+        std::fs::write(at(name), bytes).unwrap();
+    }
+    // Each alone may be read: 2.3 GB as floats.
+    for (name, color) in [("one.png", 0), ("other.png", 255)] {
+        let mut encoder = png::Encoder::new(std::fs::File::create(at(name)).unwrap(), 24_000, 24_000);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(png::BitDepth::One);
+        encoder.set_compression(png::Compression::High);
+        encoder.write_header().unwrap().write_image_data(&vec![color; 3000 * 24_000]).unwrap();
+    }
+    image::GrayImage::new(8, 6).save(at("small.png")).unwrap();
+    let mut masked = Settings { mode: Mode::Exact, ..Settings::default() };
+    masked.mask = Some(Mask { path: at("rgb.png"), layer: None });
+    for (reference, test, settings, says) in [
+        ("rgb.png", "small.png", Settings::default(), "7680 x 4320 pixels, the test image 8 x 6"),
+        ("small.png", "zip.exr", Settings::default(), "8 x 6 pixels, the test image 7680 x 4320"),
+        ("small.png", "old.hdr", Settings { mode: Mode::Exact, ..Settings::default() }, "8 x 6 pixels"),
+        ("one.png", "other.png", Settings::default(), "both images together take 4608000000 bytes"),
+        ("small.png", "small.png", masked, "the mask has 7680 x 4320 pixels, the images have 8 x 6"),
+    ] {
+        let before = NOW.load(Relaxed);
+        PEAK.store(before, Relaxed);
+        let found = compare(&at(reference), &at(test), &settings, &|_, _, _| (), &mut |_, _| Ok(()));
+        let took = PEAK.load(Relaxed).saturating_sub(before);
+        let error = found.unwrap_err().to_string();
+        assert!(error.contains(says), "{reference} {test}: {error}");
+        assert!(took < 4 << 20, "{reference} {test} took {took} bytes");
     }
 }
 

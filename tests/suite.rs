@@ -25,7 +25,7 @@ fn run(out: &Path, more: &[&str]) -> Record {
 
 fn verify(out: &Path) -> String {
     let output = aogauge(&["golden", "verify", out.to_str().unwrap()]);
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert_eq!(output.status.code(), Some(0), "{text}");
     text
 }

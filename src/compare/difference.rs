@@ -5,7 +5,10 @@ use super::{Rect, exact::within};
 use crate::{
     layers::{Layers, srgb},
     metrics::image::{Encoding, Image},
-    picture::read::{Samples, Values},
+    picture::{
+        channel::Channel,
+        read::{Samples, Values},
+    },
 };
 use image::{Rgb, RgbImage};
 
@@ -19,6 +22,8 @@ const FADE: f32 = 0.25;
 pub(super) enum Stored<'a> {
     /// As they are stored, alpha among the channels.
     Samples(&'a Samples),
+    /// The same of OpenEXR, channel by channel.
+    Channels(&'a [Channel]),
     /// As floats.
     Image(&'a Image),
 }
@@ -40,6 +45,7 @@ impl Stored<'_> {
     fn width(&self) -> usize {
         match self {
             Stored::Samples(s) => s.size[0],
+            Stored::Channels(c) => c.first().map_or(0, |c| c.size[0]),
             Stored::Image(i) => i.size()[0],
         }
     }
@@ -47,17 +53,19 @@ impl Stored<'_> {
     fn channels(&self) -> usize {
         match self {
             Stored::Samples(s) => s.channels,
+            Stored::Channels(c) => c.len(),
             Stored::Image(i) => i.planes().len(),
         }
     }
 
     /// The names of the channels as OpenEXR has them.
-    fn names(&self) -> &'static [&'static str] {
-        match self.channels() {
-            1 => &["Y"],
-            2 => &["Y", "A"],
-            3 => &["R", "G", "B"],
-            _ => &["R", "G", "B", "A"],
+    fn names(&self) -> Vec<&str> {
+        match (self, self.channels()) {
+            (_, 1) => vec!["Y"],
+            (Stored::Channels(c), _) => c.iter().map(|c| c.name.as_str()).collect(),
+            (_, 2) => vec!["Y", "A"],
+            (_, 3) => vec!["R", "G", "B"],
+            _ => vec!["R", "G", "B", "A"],
         }
     }
 
@@ -72,6 +80,7 @@ impl Stored<'_> {
                     Values::F32(v) => v[i].into(),
                 }
             }
+            Stored::Channels(c) => c[channel].numbers.at(pixel),
             Stored::Image(i) => i.planes()[channel][pixel].into(),
         }
     }
@@ -85,21 +94,35 @@ impl Stored<'_> {
         }
     }
 
+    /// The channels that are seen: the colours, of OpenEXR those that are called so, else
+    /// the first.
+    fn colors(&self) -> Vec<usize> {
+        let named = |channels: &[Channel], name: &str| channels.iter().position(|c| c.name == name);
+        match self {
+            Stored::Channels(all) => match ["R", "G", "B"].map(|name| named(all, name)) {
+                [Some(r), Some(g), Some(b)] => vec![r, g, b],
+                _ => vec![named(all, "Y").or_else(|| named(all, "mean")).unwrap_or(0)],
+            },
+            _ if self.channels() < 3 => vec![0],
+            _ => vec![0, 1, 2],
+        }
+    }
+
     /// The mean of the colour channels as a screen shows it, 0 to 1.
-    fn grey(&self, pixel: usize) -> f32 {
+    fn grey(&self, pixel: usize, colors: &[usize]) -> f32 {
         let linear = match self {
             Stored::Samples(s) => matches!(s.values, Values::F32(_)),
+            Stored::Channels(_) => true,
             Stored::Image(i) => i.encoding() == Encoding::Linear,
         };
-        let colors = if self.channels() < 3 { 1 } else { 3 };
-        let mean = ((0..colors).map(|c| self.value(pixel, c)).sum::<f64>() / colors as f64) as f32;
+        let mean = (colors.iter().map(|&c| self.value(pixel, c)).sum::<f64>() / colors.len() as f64) as f32;
         if linear { f32::from(srgb(mean)) / 255.0 } else { mean.clamp(0.0, 1.0) }
     }
 }
 
 impl Difference<'_> {
     /// `test - reference` a channel, in layers `signed.R`, `.G`, `.B` or `signed` of grey,
-    /// and `signed.A` where alpha was compared. Integers are shares of their range. NaN
+    /// and `signed.NAME` of every other channel that was compared. Integers are shares of their range. NaN
     /// where either image holds NaN or both the same infinity; pixels that do not count
     /// have their numbers too.
     pub fn layers(&self) -> Layers {
@@ -116,9 +139,10 @@ impl Difference<'_> {
     pub fn marked(&self) -> RgbImage {
         let mut places = self.places();
         let within = self.reference.within(&self.test, self.tolerance);
+        let colors = self.reference.colors();
         RgbImage::from_fn(self.part.width as u32, self.part.height as u32, |_, _| match places.next() {
             Some(i) if self.differs(i, within) => MARK,
-            Some(i) => Rgb([((1.0 - FADE * (1.0 - self.reference.grey(i))) * 255.0).round() as u8; 3]),
+            Some(i) => Rgb([((1.0 - FADE * (1.0 - self.reference.grey(i, &colors))) * 255.0).round() as u8; 3]),
             None => MARK,
         })
     }

@@ -51,7 +51,7 @@ impl Exact {
 }
 
 /// A stored number.
-trait Sample: Copy + PartialEq + Sync {
+pub(super) trait Sample: Copy + PartialEq + Sync {
     /// How far two of them are apart.
     type Distance: Copy + PartialOrd + Default + Send + Sync;
     fn distance(self, other: Self) -> Self::Distance;
@@ -180,13 +180,7 @@ pub fn exact_images(
                 if weights.is_some_and(|w| w[i] <= 0.0) {
                     continue;
                 }
-                count.pixels += 1;
-                let distance = planes.iter().map(|(r, t)| r[i].distance(t[i])).fold(0.0, f64::max);
-                count.largest = count.largest.max(distance);
-                if distance > within {
-                    count.differing += 1;
-                    count.first = count.first.or(Some(i));
-                }
+                count.add(planes.iter().map(|(r, t)| r[i].distance(t[i])).fold(0.0, f64::max), within, i);
             }
             count
         })
@@ -215,7 +209,7 @@ struct View<'a> {
 
 /// Of some rows.
 #[derive(Clone, Copy, Default)]
-struct Count<D> {
+pub(super) struct Count<D> {
     pixels: u64,
     differing: u64,
     largest: D,
@@ -275,8 +269,18 @@ impl View<'_> {
 }
 
 impl Count<f64> {
+    /// Counts a pixel that is so far apart.
+    pub(super) fn add(&mut self, distance: f64, within: f64, at: usize) {
+        self.pixels += 1;
+        self.largest = self.largest.max(distance);
+        if distance > within {
+            self.differing += 1;
+            self.first = self.first.or(Some(at));
+        }
+    }
+
     /// What it comes to; None where there is no pixel.
-    fn found(self, size: [usize; 2], place: impl Fn(usize) -> [usize; 2]) -> Option<Exact> {
+    pub(super) fn found(self, size: [usize; 2], place: impl Fn(usize) -> [usize; 2]) -> Option<Exact> {
         (self.pixels > 0).then(|| Exact {
             size,
             pixels: self.pixels,
@@ -289,7 +293,7 @@ impl Count<f64> {
     }
 }
 
-fn and<D: PartialOrd>(a: Count<D>, b: Count<D>) -> Count<D> {
+pub(super) fn and<D: PartialOrd>(a: Count<D>, b: Count<D>) -> Count<D> {
     Count {
         pixels: a.pixels + b.pixels,
         differing: a.differing + b.differing,

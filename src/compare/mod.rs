@@ -3,6 +3,7 @@
 //!
 //! Any renderer's images will do: nothing here knows of scenes or suites.
 
+mod channels;
 mod difference;
 mod exact;
 mod folders;
@@ -13,6 +14,7 @@ mod region;
 mod report;
 mod sampled;
 
+pub use channels::exact_channels;
 pub use difference::Difference;
 pub use exact::{Exact, exact, exact_images};
 pub use folders::Pairing;
@@ -30,7 +32,10 @@ use crate::{
         read::{Alpha, Found},
     },
 };
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 /// The chance that Welch's test rejects anything, over all places and scales, where
 /// both images have one expectation.
@@ -71,13 +76,14 @@ pub enum CompareError {
     /// Integers against floats.
     #[error(
         "one image holds integers (8 or 16 bits a channel) and the other floats, and the pixel-exact metric compares \
-         numbers as they are stored: save both in one format, or compare with --encoding and without --exact"
+         numbers as they are stored: save both in one format, or leave --exact away and say by --reference-encoding or \
+         --test-encoding what the numbers of one stand for"
     )]
     Kinds,
     /// sRGB codes against linear light.
     #[error(
-        "{} and {}: save both in one format, or say by --encoding linear or --encoding srgb what the numbers of both \
-         stand for", taken_for("reference", *reference), taken_for("test image", *test)
+        "{} and {}: say by --reference-encoding or --test-encoding, linear or srgb, what the numbers of one stand for, and \
+         both are compared as linear light; or by --encoding what those of both stand for", taken_for("reference", *reference), taken_for("test image", *test)
     )]
     Encodings {
         /// Of the reference.
@@ -103,6 +109,39 @@ pub enum CompareError {
         reference: [i32; 2],
         /// Of the test image.
         test: [i32; 2],
+    },
+    /// The channels of two OpenEXR files have other names.
+    #[error(
+        "the reference has the channels {reference} and the test image {test}: name a layer of both by --layer, or of \
+         one by FILE.exr:LAYER"
+    )]
+    ChannelNames {
+        /// Of the reference.
+        reference: String,
+        /// Of the test image.
+        test: String,
+    },
+    /// The parts of an OpenEXR file have several sizes.
+    #[error("the parts of the OpenEXR files are of several sizes: compare each for itself by --all-layers or --layer")]
+    Parts,
+    /// Both images together are too large.
+    #[error(
+        "both images together take {bytes} bytes when they are decoded, at most {most} can be taken: compare smaller \
+         ones"
+    )]
+    Together {
+        /// Bytes of both.
+        bytes: u64,
+        /// The most that may be.
+        most: u64,
+    },
+    /// A layer was named for a folder, or for one of all layers.
+    #[error("{}: FILE:LAYER names a layer of one of two images; {why}", file.display())]
+    OwnLayer {
+        /// The file or folder.
+        file: PathBuf,
+        /// What does not go with it.
+        why: &'static str,
     },
     /// A layer is in one file only.
     #[error("the layer is in {} alone", path.display())]
@@ -172,6 +211,15 @@ pub struct Mask {
     pub layer: Option<String>,
 }
 
+/// What is said of one of two images alone.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Own {
+    /// Its layer, in place of [`Settings::layer`].
+    pub layer: Option<String>,
+    /// What its numbers stand for, in place of [`Settings::encoding`].
+    pub encoding: Option<Encoding>,
+}
+
 impl Mask {
     /// Reads `FILE`, `FOLDER` or `FILE:LAYER`; what exists as it is written has no
     /// layer.
@@ -197,6 +245,9 @@ pub struct Settings {
     pub layer: Layer,
     /// What the numbers stand for; by the kind of file unless given.
     pub encoding: Option<Encoding>,
+    /// What is said of the reference alone, and of the test image. Where an encoding is
+    /// said of one, and the other's is another, both are compared as linear light.
+    pub own: [Own; 2],
     /// Weights of pixels.
     pub mask: Option<Mask>,
     /// Rectangles.
@@ -245,6 +296,15 @@ pub fn compare(
     let mut settings = settings.clone();
     settings.options.hdr |= settings.limits.all().any(|l| l.measure.needs_hdr());
     let mut comparison = Comparison::new(reference, test, &settings);
+    for (file, own) in [reference, test].into_iter().zip(&settings.own) {
+        let why = match &settings.layer {
+            _ if own.layer.is_none() => continue,
+            Layer::All => "--all-layers takes all of both",
+            _ if file.is_dir() => "this is a folder",
+            _ => continue,
+        };
+        return Err(CompareError::OwnLayer { file: file.to_owned(), why });
+    }
     match (reference.is_dir(), test.is_dir()) {
         (true, true) => {}
         (false, false) => {
@@ -290,8 +350,32 @@ fn taken_for(which: &str, encoding: Encoding) -> String {
     }
 }
 
-fn check_encodings(reference: Encoding, test: Encoding) -> Result<(), CompareError> {
-    if reference == test { Ok(()) } else { Err(CompareError::Encodings { reference, test }) }
+/// What of both files was not compared; None where nothing was left out. Alpha of 1
+/// everywhere says nothing, and replicates are `tested` elsewhere.
+fn left_out(reference: &Found, test: &Found, tested: bool) -> Option<String> {
+    const MOST: usize = 8;
+    let kept = |name: &&String| !(tested && name.starts_with("replicate-"));
+    let [mut ours, mut theirs] = [reference, test].map(|f| f.others.iter().filter(kept).collect::<BTreeSet<_>>());
+    // An alpha that says nothing, beside one that does.
+    let is_alpha = |name: &&String| name.rsplit('.').next() == Some("A");
+    match (reference.alpha, test.alpha) {
+        (Alpha::Varied, Alpha::One) => theirs.extend(ours.iter().copied().filter(is_alpha)),
+        (Alpha::One, Alpha::Varied) => ours.extend(theirs.iter().copied().filter(is_alpha)),
+        _ => {}
+    }
+    let list = |names: Vec<&&String>, of: &str| {
+        let more = names.len().saturating_sub(MOST);
+        let shown = names.iter().take(MOST).map(|n| n.as_str()).collect::<Vec<_>>().join(", ");
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        (!names.is_empty()).then(|| format!("{shown}{more} of {of}"))
+    };
+    let parts = [
+        list(ours.intersection(&theirs).collect(), "both"),
+        list(ours.difference(&theirs).collect(), "the reference alone"),
+        list(theirs.difference(&ours).collect(), "the test image alone"),
+    ];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    (!parts.is_empty()).then(|| format!("not compared: {}", parts.join("; ")))
 }
 
 /// Alpha is left out. Where one image alone has it, that is a note if it is 1 everywhere

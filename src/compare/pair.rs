@@ -1,16 +1,21 @@
 //! Two files: read, cut, measured and judged.
 
 use super::{
-    CompareError, Difference, Drawn, Exact, Layer, Mask, Measured, Mode, PairReport, Rect, Settings, Weights,
-    check_alpha, check_encodings, check_origins,
+    CompareError, Difference, Drawn, Exact, Layer, Mask, Measured, Mode, PairReport, Rect, Settings, Weights, channels,
+    check_alpha, check_origins,
     difference::Stored,
-    exact, exact_images,
+    exact, exact_channels, exact_images, left_out,
     sampled::{Sampled, WelchReport},
 };
 use crate::{
-    layers::{Layers, load},
+    claim::MAX_BYTES,
+    disk::DiskError,
+    layers::{Layers, linear, load},
     metrics::image::{Encoding, Image, ImageError, Pair, scores},
-    picture::read::{self, Found, LayerChoice},
+    picture::{
+        channel::Group,
+        read::{self, Claim, Found, LayerChoice},
+    },
     stats::pixel_p_values,
 };
 use std::{collections::BTreeMap, path::Path};
@@ -25,8 +30,16 @@ pub(super) struct Files<'a> {
     pub(super) mask: Option<&'a str>,
 }
 
+/// The bytes of two files.
+struct Bytes<'a> {
+    reference: &'a [u8],
+    test: &'a [u8],
+    /// Whether they are equal, and the same is taken of both.
+    same: bool,
+}
+
 /// A layer of both images, or why there is none.
-type NamedLayer = (String, Result<(Found, Found), CompareError>);
+type Layered<T> = (String, Result<(T, T), CompareError>);
 
 /// Is given every pair that is drawn.
 type Keep<'a> = dyn FnMut(&PairReport, &Drawn<'_>) -> Result<(), CompareError> + 'a;
@@ -36,41 +49,62 @@ impl Files<'_> {
     pub(super) fn compare(&self, settings: &Settings, keep: &mut Keep<'_>) -> Result<Vec<PairReport>, CompareError> {
         let (reference, test) = rayon::join(|| load(self.reference), || load(self.test));
         let (reference, test) = (reference?, test?);
-        let mask = self.mask(settings.mask.as_ref())?;
+        // Two layers of one file are no two of the same.
+        let same = reference == test && settings.own[0].layer == settings.own[1].layer;
+        let bytes = Bytes { same, reference: &reference, test: &test };
+        let size = self.claimed(&bytes, settings).map_err(|e| self.between(e))?;
+        let mask = self.mask(settings.mask.as_ref(), size).map_err(|e| self.between(e))?;
         if settings.mode == Mode::Exact {
-            let found = self.exact(&reference, &test, settings, mask.as_ref(), keep);
-            if let Some(report) = found.map_err(|e| self.between(e))? {
-                return Ok(vec![report]);
-            }
+            return self.exact(&bytes, settings, mask.as_ref(), keep);
         }
-        let (ours, theirs) = rayon::join(
-            || read::decode(self.reference, &reference, choice(&settings.layer), settings.encoding),
-            || read::decode(self.test, &test, choice(&settings.layer), settings.encoding),
-        );
+        let decode = |side: usize, path: &Path, bytes: &[u8]| {
+            let encoding = settings.own[side].encoding.or(settings.encoding);
+            read::decode(path, bytes, choice(settings, side), encoding)
+        };
+        let (ours, theirs) = rayon::join(|| decode(0, self.reference, &reference), || decode(1, self.test, &test));
         let (ours, theirs) = (ours?, theirs?);
         let sampled = self.sampled(&reference, &test, settings)?;
-        let same = reference == test;
         drop((reference, test));
-        self.layers(ours, theirs, settings.layer == Layer::All)
-            .into_iter()
-            .map(|(layer, pair)| {
-                let report =
-                    pair.and_then(|(r, t)| self.layer(&layer, &r, &t, settings, mask.as_ref(), sampled.as_ref(), keep));
-                match report {
-                    // One layer that cannot be compared leaves the others.
-                    Err(e) if settings.layer == Layer::All && !matches!(e, CompareError::Disk(_)) => {
-                        Ok(PairReport::failed(self.name, Some(layer), &e))
-                    }
-                    Err(e) => Err(self.between(e)),
-                    Ok(mut report) => {
-                        if let Some(exact) = report.exact.as_mut().filter(|_| settings.mode == Mode::Exact) {
-                            exact.identical_files = same;
-                        }
-                        Ok(report)
-                    }
-                }
-            })
-            .collect()
+        let pairs = self.pairs(ours, theirs, settings, |found| &found.layer);
+        self.each(pairs, settings, |layer, r, t| {
+            let (r, t) = in_one_light(r, t, settings)?;
+            self.layer(layer, &r, &t, settings, mask.as_ref(), sampled.as_ref(), keep)
+        })
+    }
+
+    /// The size of both by their headers, where it is one, before anything is decoded.
+    fn claimed(&self, bytes: &Bytes<'_>, settings: &Settings) -> Result<Option<[usize; 2]>, CompareError> {
+        let [ours, theirs] = [read::claim(self.reference, bytes.reference)?, read::claim(self.test, bytes.test)?];
+        if let (Some(reference), Some(test)) = (ours.size, theirs.size)
+            && reference != test
+        {
+            return Err(ImageError::Size { reference, test }.into());
+        }
+        let of = |claim: &Claim| if settings.mode == Mode::Exact { claim.stored } else { claim.floats };
+        let both = of(&ours).saturating_add(of(&theirs));
+        // Of two files of the same bytes the rows of one are decoded, one by one.
+        let passes = bytes.same && settings.mode == Mode::Exact && !settings.draw_exact;
+        if both > MAX_BYTES && !passes {
+            return Err(CompareError::Together { bytes: both, most: MAX_BYTES });
+        }
+        Ok(ours.size)
+    }
+
+    /// A report of each pair of layers.
+    fn each<T>(
+        &self,
+        pairs: Vec<Layered<T>>,
+        settings: &Settings,
+        mut report: impl FnMut(&str, T, T) -> Result<PairReport, CompareError>,
+    ) -> Result<Vec<PairReport>, CompareError> {
+        let one = |(layer, pair): Layered<T>| match pair.and_then(|(r, t)| report(&layer, r, t)) {
+            // One layer that cannot be compared leaves the others.
+            Err(e) if settings.layer == Layer::All && !matches!(e, CompareError::Disk(_)) => {
+                Ok(PairReport::failed(self.name, Some(layer), &e))
+            }
+            found => found.map_err(|e| self.between(e)),
+        };
+        pairs.into_iter().map(one).collect()
     }
 
     /// Names both files, where an error does not name its own.
@@ -84,16 +118,16 @@ impl Files<'_> {
     }
 
     /// Both images layer by layer, by name where all are compared.
-    fn layers(&self, ours: Vec<Found>, theirs: Vec<Found>, all: bool) -> Vec<NamedLayer> {
-        if !all {
-            return ours.into_iter().zip(theirs).map(|(r, t)| (r.layer.clone(), Ok((r, t)))).collect();
+    fn pairs<T>(&self, ours: Vec<T>, theirs: Vec<T>, settings: &Settings, name: fn(&T) -> &String) -> Vec<Layered<T>> {
+        if settings.layer != Layer::All {
+            return ours.into_iter().zip(theirs).map(|(r, t)| (name(&r).clone(), Ok((r, t)))).collect();
         }
-        let mut theirs: BTreeMap<String, Found> = theirs.into_iter().map(|t| (t.layer.clone(), t)).collect();
+        let mut theirs: BTreeMap<String, T> = theirs.into_iter().map(|t| (name(&t).clone(), t)).collect();
         let alone = |path: &Path| Err(CompareError::Layer { path: path.into() });
         let mut pairs: Vec<_> = ours
             .into_iter()
             .map(|r| {
-                let name = r.layer.clone();
+                let name = name(&r).clone();
                 let pair = theirs.remove(&name).map_or_else(|| alone(self.reference), |t| Ok((r, t)));
                 (name, pair)
             })
@@ -102,33 +136,42 @@ impl Files<'_> {
         pairs
     }
 
-    /// The pixel-exact metric on stored numbers; None where layers must be told apart
-    /// first, which [`Files::layer`] does.
+    /// The pixel-exact metric on stored numbers.
     fn exact(
         &self,
-        reference: &[u8],
-        test: &[u8],
+        bytes: &Bytes<'_>,
         settings: &Settings,
         mask: Option<&Weights>,
         keep: &mut Keep<'_>,
-    ) -> Result<Option<PairReport>, CompareError> {
+    ) -> Result<Vec<PairReport>, CompareError> {
+        if read::is_exr(self.reference, bytes.reference) || read::is_exr(self.test, bytes.test) {
+            return self.exact_layers(bytes, settings, mask, keep);
+        }
+        self.exact_samples(bytes, settings, mask, keep).map(|report| vec![report]).map_err(|e| self.between(e))
+    }
+
+    fn exact_samples(
+        &self,
+        bytes: &Bytes<'_>,
+        settings: &Settings,
+        mask: Option<&Weights>,
+        keep: &mut Keep<'_>,
+    ) -> Result<PairReport, CompareError> {
         let region = &settings.region;
         let judged = |exact| PairReport::judged(self.name, None, exact, None, None, &settings.limits);
-        let same = reference == test;
-        if same && !settings.draw_exact {
-            // A header that can be read; what follows it is the same in both.
-            let size = read::size(self.reference, reference)?;
+        if let Some(path) = self.with_layer(settings) {
+            return Err(DiskError::content(path, "only OpenEXR images have layers").into());
+        }
+        if bytes.same && !settings.draw_exact {
+            // Two files that are broken alike are no images that are equal.
+            let size = read::check_whole(self.reference, bytes.reference)?;
             let weights = region.weights(size, mask)?;
-            return Ok(Some(judged(Exact::of_identical_files(size, region, weights.as_deref()))));
+            return Ok(judged(Exact::of_identical_files(size, region, weights.as_deref())));
         }
-        if read::is_exr(self.reference, reference) || read::is_exr(self.test, test) {
-            return Ok(None);
-        }
-        if matches!(settings.layer, Layer::Named(_)) {
-            return Err(crate::disk::DiskError::content(self.reference, "only OpenEXR images have layers").into());
-        }
-        let (ours, theirs) =
-            rayon::join(|| read::decode_samples(self.reference, reference), || read::decode_samples(self.test, test));
+        let (ours, theirs) = rayon::join(
+            || read::decode_samples(self.reference, bytes.reference),
+            || read::decode_samples(self.test, bytes.test),
+        );
         let (ours, theirs) = (ours?, theirs?);
         if ours.size != theirs.size {
             return Err(ImageError::Size { reference: ours.size, test: theirs.size }.into());
@@ -136,14 +179,65 @@ impl Files<'_> {
         let weights = region.weights(ours.size, mask)?;
         let weights = weights.as_deref();
         let found = exact(&ours, &theirs, region, weights, settings.tolerance)?;
-        let report = judged(Exact { identical_files: same, ..found });
+        let report = judged(Exact { identical_files: bytes.same, ..found });
         if settings.draw_exact {
             let [reference, test] = [Stored::Samples(&ours), Stored::Samples(&theirs)];
             let part = region.crop.unwrap_or(Rect::whole(ours.size));
             let difference = Difference { reference, test, part, weights, tolerance: settings.tolerance };
             keep(&report, &Drawn { difference, measured: None })?;
         }
-        Ok(Some(report))
+        Ok(report)
+    }
+
+    /// The same of OpenEXR: all channels of all parts together, unless layers are asked
+    /// for.
+    fn exact_layers(
+        &self,
+        bytes: &Bytes<'_>,
+        settings: &Settings,
+        mask: Option<&Weights>,
+        keep: &mut Keep<'_>,
+    ) -> Result<Vec<PairReport>, CompareError> {
+        let groups = |side: usize, path: &Path, bytes: &[u8]| -> Result<Vec<Group>, CompareError> {
+            let whole = settings.layer != Layer::All && self.with_layer(settings).is_none();
+            let choice = (!whole).then(|| choice(settings, side));
+            if read::is_exr(path, bytes) || matches!(choice, Some(LayerChoice::Named(_))) {
+                return Ok(read::channels(path, bytes, choice)?);
+            }
+            let channels = channels::of_samples(&read::decode_samples(path, bytes)?)?;
+            Ok(vec![Group { layer: String::new(), channels }])
+        };
+        let (ours, theirs) = rayon::join(
+            || groups(0, self.reference, bytes.reference),
+            || if bytes.same { Ok(Vec::new()) } else { groups(1, self.test, bytes.test) },
+        );
+        let ours = ours.map_err(|e| self.between(e))?;
+        let theirs = if bytes.same { ours.clone() } else { theirs.map_err(|e| self.between(e))? };
+        let pairs = self.pairs(ours, theirs, settings, |group| &group.layer);
+        self.each(pairs, settings, |layer, ours, theirs| {
+            let (ours, theirs) = (&ours.channels[..], &theirs.channels[..]);
+            let (region, tolerance) = (&settings.region, settings.tolerance);
+            let size = channels::shape(ours, theirs)?;
+            let weights = region.weights(size, mask)?;
+            let weights = weights.as_deref();
+            let found = exact_channels(ours, theirs, region, weights, tolerance)?;
+            let layer = Some(layer.to_owned()).filter(|l| !l.is_empty());
+            let found = Exact { identical_files: bytes.same, ..found };
+            let report = PairReport::judged(self.name, layer, found, None, None, &settings.limits);
+            if settings.draw_exact {
+                let [reference, test] = [Stored::Channels(ours), Stored::Channels(theirs)];
+                let part = region.crop.unwrap_or(Rect::whole(size));
+                let difference = Difference { reference, test, part, weights, tolerance };
+                keep(&report, &Drawn { difference, measured: None })?;
+            }
+            Ok(report)
+        })
+    }
+
+    /// The first file of which a layer is named.
+    fn with_layer(&self, settings: &Settings) -> Option<&Path> {
+        let named = |side: usize| matches!(choice(settings, side), LayerChoice::Named(_));
+        [self.reference, self.test].into_iter().enumerate().find(|(side, _)| named(*side)).map(|(_, path)| path)
     }
 
     /// One layer of both.
@@ -162,8 +256,9 @@ impl Files<'_> {
         if whole != test.image.size() {
             return Err(ImageError::Size { reference: whole, test: test.image.size() }.into());
         }
-        check_encodings(reference.image.encoding(), test.image.encoding())?;
-        let note = check_alpha(reference, test)?;
+        let notes = [check_alpha(reference, test)?, left_out(reference, test, sampled.is_some())];
+        let notes: Vec<String> = notes.into_iter().flatten().collect();
+        let note = (!notes.is_empty()).then(|| notes.join("; "));
         check_origins(reference.origin, test.origin)?;
         let region = &settings.region;
         let weights = region.weights(whole, mask)?;
@@ -184,13 +279,6 @@ impl Files<'_> {
             weights: weights.as_deref(),
             tolerance: settings.tolerance,
         };
-        if settings.mode == Mode::Exact {
-            let report = PairReport::judged(self.name, layer, exact, None, None, &settings.limits).with_note(note);
-            if settings.draw_exact {
-                keep(&report, &Drawn { difference, measured: None })?;
-            }
-            return Ok(report);
-        }
         let pair = Pair::new(reference, test, weights.as_deref())?;
         let (scores, maps) = scores(&pair, &settings.options)?;
         let size = scores.size.map(|n| n as u32);
@@ -202,8 +290,9 @@ impl Files<'_> {
         Ok(report)
     }
 
-    /// The mask's weights: linear, the mean of its channels.
-    fn mask(&self, mask: Option<&Mask>) -> Result<Option<Weights>, CompareError> {
+    /// The mask's weights: linear, the mean of its channels. Of another size than the
+    /// images it is not decoded.
+    fn mask(&self, mask: Option<&Mask>, size: Option<[usize; 2]>) -> Result<Option<Weights>, CompareError> {
         let Some(mask) = mask else {
             return Ok(None);
         };
@@ -213,7 +302,15 @@ impl Files<'_> {
             Some(path) => path,
             None => &mask.path,
         };
-        let image = read::read(path, mask.layer.as_deref(), Some(Encoding::Linear))?.image;
+        let bytes = load(path)?;
+        if let (Some(mask), Some(image)) = (read::claim(path, &bytes)?.size, size)
+            && mask != image
+        {
+            return Err(ImageError::MaskSize { mask, image }.into());
+        }
+        let layer = mask.layer.as_deref().map_or(LayerChoice::Main, LayerChoice::Named);
+        let mut found = read::decode(path, &bytes, layer, Some(Encoding::Linear))?;
+        let image = found.pop().ok_or_else(|| DiskError::content(path, "the mask has no layer"))?.image;
         let planes = image.planes();
         let weight = |i: usize| planes.iter().map(|p| p[i]).sum::<f32>() / planes.len() as f32;
         let weights: Vec<f32> = (0..image.pixels()).map(weight).collect();
@@ -236,6 +333,7 @@ impl Files<'_> {
             Layer::Named(name) => name == "mean",
             Layer::All => false,
         };
+        let is_mean = is_mean && settings.own.iter().all(|own| own.layer.is_none());
         if !is_mean || settings.mode == Mode::Exact || !settings.region.is_whole() || settings.mask.is_some() {
             return Ok(None);
         }
@@ -255,10 +353,32 @@ impl Files<'_> {
     }
 }
 
-fn choice(layer: &Layer) -> LayerChoice<'_> {
-    match layer {
-        Layer::Main => LayerChoice::Main,
-        Layer::Named(name) => LayerChoice::Named(name),
-        Layer::All => LayerChoice::All,
+/// What of a file is taken, of the reference (0) or the test image (1).
+fn choice(settings: &Settings, side: usize) -> LayerChoice<'_> {
+    match (&settings.own[side].layer, &settings.layer) {
+        (Some(name), _) | (None, Layer::Named(name)) => LayerChoice::Named(name),
+        (None, Layer::Main) => LayerChoice::Main,
+        (None, Layer::All) => LayerChoice::All,
     }
+}
+
+/// Both as linear light, where they are not of one encoding and that was said.
+fn in_one_light(reference: Found, test: Found, settings: &Settings) -> Result<(Found, Found), CompareError> {
+    let (ours, theirs) = (reference.image.encoding(), test.image.encoding());
+    if ours == theirs {
+        return Ok((reference, test));
+    }
+    if settings.own.iter().all(|own| own.encoding.is_none()) {
+        return Err(CompareError::Encodings { reference: ours, test: theirs });
+    }
+    let linear = |found: Found| -> Result<Found, CompareError> {
+        let image = &found.image;
+        if image.encoding() == Encoding::Linear {
+            return Ok(found);
+        }
+        let planes = image.planes().iter().map(|p| p.iter().map(|&v| linear(v)).collect()).collect();
+        let image = Image::new(image.size(), planes, Encoding::Linear)?;
+        Ok(Found { image, ..found })
+    };
+    Ok((linear(reference)?, linear(test)?))
 }

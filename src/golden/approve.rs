@@ -1,9 +1,13 @@
 //! Accepting images of a record as goldens.
 
-use super::{Golden, Identity, Limits, Provenance, Sampled, Slot, Store, file::regions, store::golden_cases};
+use super::{
+    Golden, Identity, Limits, Notice, Provenance, Sampled, Slot, Store,
+    file::regions,
+    store::{Snapshot, golden_cases},
+};
 use crate::{
     disk::DiskError,
-    layers::{Layers, pixel_hash},
+    layers::{Layers, is_pointer, pixel_hash},
     record::{CaseRecord, Record},
 };
 use rayon::prelude::*;
@@ -45,12 +49,17 @@ pub struct Approval<'a> {
     pub name: Option<&'a str>,
     /// What may differ where there is no noise.
     pub limits: Option<Limits>,
+    /// The most bytes that all goldens may hold after it.
+    pub most: Option<u64>,
+    /// Only tells what would be written.
+    pub dry_run: bool,
 }
 
 /// What an approval did to the store.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Approved {
-    /// The goldens written; none where the record has no such case.
+    /// The goldens written, or those that a dry run would write; none where the record
+    /// has no such case.
     pub files: Vec<PathBuf>,
     /// Bytes of all goldens before.
     pub before: u64,
@@ -68,6 +77,25 @@ pub enum ApproveError {
         selected: usize,
         /// The lost ones, each with its error.
         lost: Vec<String>,
+    },
+    /// What stands for a golden cannot be looked at.
+    #[error(
+        "{}: this is a Git LFS pointer, not the golden: run `git lfs pull` to have it, or `aogauge golden remove` to \
+         give it up; nothing is approved", file.display()
+    )]
+    Pointer {
+        /// The golden's file.
+        file: PathBuf,
+    },
+    /// The store would grow beyond a limit.
+    #[error("the store holds {before} bytes and would hold {after}, more than {most}; nothing is approved")]
+    Large {
+        /// Bytes of all goldens now.
+        before: u64,
+        /// Bytes of all goldens after it.
+        after: u64,
+        /// The limit, bytes.
+        most: u64,
     },
     /// A file cannot be read or written, or is not what it should be.
     #[error(transparent)]
@@ -97,47 +125,75 @@ pub fn sampled(folder: &Path, record: &Record, case: &CaseRecord) -> Result<Samp
 }
 
 impl Store {
-    /// Accepts images of a record as goldens: all that are selected, or none. `waiting`
-    /// as in [`Store::change`].
+    /// Accepts images of a record as goldens: all that are selected, or none. `told` as in
+    /// [`Store::change`], and of the size before anything is changed.
     ///
     /// # Errors
     /// Where a selected case ended with an error, an image of the record cannot be read,
-    /// limits are given for an image with noise, or the store cannot be written.
+    /// limits are given for an image with noise, a golden is a Git LFS pointer, the store
+    /// would grow beyond the limit, or it cannot be written.
     pub fn approve(
         &self,
         folder: &Path,
         record: &Record,
         approval: &Approval<'_>,
-        waiting: &dyn Fn(),
+        told: &dyn Fn(Notice),
     ) -> Result<Approved, ApproveError> {
         let selected = |c: &&CaseRecord| c.case.renderer == approval.renderer && approval.only.selects(&c.case.id());
         let cases: Vec<&CaseRecord> = golden_cases(record).filter(selected).collect();
-        let told = |c: &&CaseRecord| Some(format!("{} ({})", c.case.id(), c.error.as_deref()?));
-        let lost: Vec<String> = cases.iter().filter_map(told).collect();
+        let why = |c: &&CaseRecord| Some(format!("{} ({})", c.case.id(), c.error.as_deref()?));
+        let lost: Vec<String> = cases.iter().filter_map(why).collect();
         if !lost.is_empty() {
             return Err(ApproveError::Lost { selected: cases.len(), lost });
         }
-        let ready: Vec<(Slot, Layers)> = cases
+        let ready: Vec<(Slot, Vec<u8>)> = cases
             .par_iter()
             .map(|case| {
                 let golden = golden_of(folder, record, case, approval)?;
                 let slot = Slot { name: approval.name.map(str::to_owned), ..Slot::of(case) };
-                Ok((slot, golden.to_layers()))
+                let bytes = golden.to_layers().to_bytes();
+                Ok((slot, bytes.map_err(DiskError::io(folder, "encode a golden of the record"))?))
             })
             .collect::<Result<_, DiskError>>()?;
         if ready.is_empty() {
             return Ok(Approved::default());
         }
-        let mut change = self.change(waiting)?;
-        let size = |path: &Path| fs::metadata(path).map_or(0, |m| m.len());
-        let before: u64 = self.snapshot()?.files.values().map(|path| size(path)).sum();
-        let mut after = before;
-        for (slot, layers) in &ready {
-            after = (after + change.put(&slot.path(), layers)?).saturating_sub(size(&self.path(slot)));
+        if approval.dry_run {
+            return self.reading(|snapshot| self.growth(snapshot, &ready, approval, told))?;
+        }
+        let mut change = self.change(told)?;
+        let approved = self.growth(&self.snapshot()?, &ready, approval, told)?;
+        for (slot, bytes) in &ready {
+            change.put(&slot.path(), bytes)?;
         }
         change.commit()?;
-        let approved: Vec<String> = cases.iter().map(|c| c.case.id()).collect();
-        self.forget_rejections(&approved, waiting)?;
+        let approved_cases: Vec<String> = cases.iter().map(|c| c.case.id()).collect();
+        self.forget_rejections(&approved_cases, told)?;
+        Ok(approved)
+    }
+
+    /// What writing these goldens comes to, unless that may not be.
+    fn growth(
+        &self,
+        snapshot: &Snapshot,
+        ready: &[(Slot, Vec<u8>)],
+        approval: &Approval<'_>,
+        told: &dyn Fn(Notice),
+    ) -> Result<Approved, ApproveError> {
+        let size = |path: &PathBuf| fs::metadata(path).map_or(0, |m| m.len());
+        let before: u64 = snapshot.files.values().map(size).sum();
+        let mut after = before;
+        for (slot, bytes) in ready {
+            let replaced = snapshot.files.get(slot);
+            if replaced.is_some_and(|path| is_pointer(path)) {
+                return Err(ApproveError::Pointer { file: self.path(slot) });
+            }
+            after = (after + bytes.len() as u64).saturating_sub(replaced.map_or(0, size));
+        }
+        if let Some(most) = approval.most.filter(|most| after > *most) {
+            return Err(ApproveError::Large { before, after, most });
+        }
+        told(Notice::Size { before, after });
         Ok(Approved { files: ready.iter().map(|(slot, _)| self.path(slot)).collect(), before, after })
     }
 }

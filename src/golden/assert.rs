@@ -1,10 +1,14 @@
 //! Goldens for anybody's `#[test]`.
 
 use super::{Picture, Tolerance};
-use crate::{disk::DiskError, layers::write_png, scenes::check_name};
+use crate::{
+    disk::DiskError,
+    layers::{is_pointer, write_png},
+    scenes::check_name,
+};
 use std::{
     env, fs,
-    io::{self, Read, Write},
+    io::{self, Write},
     path::{Path, PathBuf},
 };
 
@@ -247,13 +251,6 @@ fn is_on(value: &str) -> Result<bool, GoldenError> {
         "" | "0" | "false" | "no" => Ok(false),
         _ => Err(GoldenError::Bless(value.to_owned())),
     }
-}
-
-/// Whether Git LFS has left a pointer in a file's place.
-fn is_pointer(path: &Path) -> bool {
-    const BEGIN: &[u8] = b"version https://git-lfs";
-    let mut begin = [0; BEGIN.len()];
-    fs::File::open(path).and_then(|mut f| f.read_exact(&mut begin)).is_ok() && begin == BEGIN
 }
 
 /// The folder that Cargo builds in: tests lie in its `deps`.

@@ -4,16 +4,18 @@
 //! - `lock`: locked by who changes the store, shared by who reads it. The system lets
 //!   go of it when its holder ends, however that ends.
 //! - `staged/0.exr`...: new files, on the same disk, synced.
-//! - `journal.json`: what is to be moved and removed. Its rename into place is the
+//! - `journal.json`: what is to be put in place and removed. Its rename into place is the
 //!   decision: before it the store is the old one, from then on the new one. Who reads
-//!   a store with a journal sees its moves as made; who changes it makes them first.
+//!   a store with a journal sees the change as made; who changes it makes it first.
+//!
+//! Staged files are copied into place and stay until the journal is gone. So a change
+//! that was cut short can be made again from its beginning, whatever was done to the
+//! files in the store meanwhile: `git checkout` of them, above all.
 
-use crate::{
-    disk::{DiskError, read_text, write_whole},
-    layers::Layers,
-};
+use crate::disk::{DiskError, is_part, read_text, write_whole};
 use serde::{Deserialize, Serialize};
 use std::{
+    collections::BTreeSet,
     fs::{self, File, TryLockError},
     io::{self, Write},
     path::{Component, Path, PathBuf},
@@ -26,8 +28,31 @@ const FOLDER: &str = ".approval";
 const PATIENCE: Duration = Duration::from_secs(1);
 /// How often it looks meanwhile.
 const STEP: Duration = Duration::from_millis(10);
+/// A golden on its way from `staged`, so that no part of one is ever seen in its place.
+const PLACING: &str = ".aogauge-placing.part";
 /// A journal larger than this is none of ours.
 const LARGEST_JOURNAL: u64 = 64 << 20;
+
+/// What who changes a store is told meanwhile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Notice {
+    /// Another command reads or changes the goldens, and this one waits for it.
+    Waiting,
+    /// A change that was decided and then cut short was finished first.
+    Finished {
+        /// Goldens put in their places.
+        written: usize,
+        /// Goldens removed.
+        removed: usize,
+    },
+    /// How many bytes all goldens hold, told before anything is changed.
+    Size {
+        /// Now.
+        before: u64,
+        /// Once the change is made.
+        after: u64,
+    },
+}
 
 #[derive(Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -119,20 +144,38 @@ impl Journal {
         Ok(Some(journal))
     }
 
-    /// Makes the moves and removals that are not made yet, then forgets them. May be cut
-    /// short anywhere and begun again.
+    /// Whether every staged file is there.
+    ///
+    /// # Errors
+    /// Where one is not: what the change was decided to be cannot be known any more.
+    fn check_staged(&self, store: &Path) -> Result<(), DiskError> {
+        let folder = staged(store);
+        let Some((gone, _)) = self.moves.iter().find(|(from, _)| !folder.join(from).is_file()) else {
+            return Ok(());
+        };
+        Err(DiskError::content(
+            &folder.join(gone),
+            format!(
+                "a change of the goldens was interrupted, and this file of it is gone: remove {} to give the change up, \
+                 and restore the goldens from version control",
+                store.join(FOLDER).display()
+            ),
+        ))
+    }
+
+    /// Makes all moves and removals, then forgets them. May be cut short anywhere and
+    /// begun again, whatever lies in the places of the goldens meanwhile.
     fn apply(&self, store: &Path) -> Result<(), DiskError> {
+        self.check_staged(store)?;
+        let mut scenes = BTreeSet::new();
         for (from, to) in &self.moves {
-            let (from, to) = (staged(store).join(from), store.join(to));
-            if !from.exists() {
-                continue;
-            }
+            let to = store.join(to);
             if let Some(scene) = to.parent() {
-                fs::create_dir_all(scene).map_err(DiskError::io(scene, "create the folder"))?;
-                fs::rename(&from, &to).map_err(DiskError::io(&to, "put the golden in its place"))?;
-                sync(scene)?;
+                place(store, &staged(store).join(from), &to, scene)?;
+                scenes.insert(scene.to_owned());
             }
         }
+        scenes.iter().try_for_each(|scene| sync(scene))?;
         for file in &self.removals {
             let file = store.join(file);
             match fs::remove_file(&file) {
@@ -147,6 +190,8 @@ impl Journal {
         sync(store)?;
         let path = journal_path(store);
         fs::remove_file(&path).map_err(DiskError::io(&path, "remove the journal"))?;
+        // Not before: a journal without its files is a change that nobody can finish.
+        sync(&store.join(FOLDER))?;
         clear(store)
     }
 }
@@ -156,47 +201,46 @@ impl Overlay {
         let Some(journal) = Journal::read(store)? else {
             return Ok(Overlay::default());
         };
+        journal.check_staged(store)?;
         let moved = journal.moves.into_iter().map(|(from, to)| (to, staged(store).join(from)));
-        Ok(Overlay {
-            moved: moved.filter(|(_, from)| from.exists()).collect(),
-            removed: journal.removals,
-            interrupted: true,
-        })
+        Ok(Overlay { moved: moved.collect(), removed: journal.removals, interrupted: true })
     }
 }
 
 impl Change {
-    pub(super) fn begin(store: &Path, waiting: &dyn Fn()) -> Result<Self, DiskError> {
+    pub(super) fn begin(store: &Path, told: &dyn Fn(Notice)) -> Result<Self, DiskError> {
         let folder = store.join(FOLDER);
         fs::create_dir_all(&folder).map_err(DiskError::io(&folder, "create the folder"))?;
-        let ignore = folder.join(".gitignore");
-        if !ignore.exists() {
-            write_whole(&ignore, |b| b.write_all(b"*\n"))?;
-        }
         let path = lock_path(store);
         let mut open = File::options();
         let file = open.create(true).truncate(false).write(true).open(&path);
         let lock = file.map_err(DiskError::io(&path, "open the store's lock"))?;
-        wait(&lock, waiting).map_err(DiskError::io(&path, "lock the store"))?;
+        wait(&lock, told).map_err(DiskError::io(&path, "lock the store"))?;
+        // Whoever wrote such a file is gone: this one alone has the lock.
+        sweep(&folder)?;
+        let ignore = folder.join(".gitignore");
+        if !ignore.exists() {
+            write_whole(&ignore, |b| b.write_all(b"*\n"))?;
+        }
         match Journal::read(store)? {
-            Some(journal) => journal.apply(store)?,
+            Some(journal) => {
+                journal.apply(store)?;
+                told(Notice::Finished { written: journal.moves.len(), removed: journal.removals.len() });
+            }
             None => clear(store)?,
         }
         Ok(Change { store: store.to_owned(), journal: Journal::default(), _lock: lock })
     }
 
-    /// Writes a golden, to be moved to `to`, `SCENE/FILE` in the store. Returns its
-    /// bytes.
+    /// Writes the bytes of a golden, to be put at `to`, `SCENE/FILE` in the store.
     ///
     /// # Errors
-    /// Where it cannot be written.
-    pub fn put(&mut self, to: &Path, layers: &Layers) -> Result<u64, DiskError> {
+    /// Where they cannot be written.
+    pub fn put(&mut self, to: &Path, bytes: &[u8]) -> Result<(), DiskError> {
         let name = format!("{}.exr", self.journal.moves.len());
-        let path = staged(&self.store).join(&name);
-        layers.write(&path)?;
+        write_whole(&staged(&self.store).join(&name), |b| b.write_all(bytes))?;
         self.journal.moves.push((name, to.to_owned()));
-        let meta = fs::metadata(&path).map_err(DiskError::io(&path, "read the golden"))?;
-        Ok(meta.len())
+        Ok(())
     }
 
     /// Removes a golden, `SCENE/FILE` in the store.
@@ -208,7 +252,7 @@ impl Change {
     ///
     /// # Errors
     /// Where the journal cannot be written: then nothing is changed; or a file not
-    /// moved: then the next change goes on where this one stopped.
+    /// put in its place: then the next change makes this one first.
     pub fn commit(self) -> Result<(), DiskError> {
         self.decide()?;
         self.journal.apply(&self.store)
@@ -226,19 +270,44 @@ impl Change {
 }
 
 /// Locks for this process alone.
-fn wait(lock: &File, waiting: &dyn Fn()) -> io::Result<()> {
+fn wait(lock: &File, told: &dyn Fn(Notice)) -> io::Result<()> {
     let began = Instant::now();
     loop {
         match lock.try_lock() {
             Ok(()) => return Ok(()),
             Err(TryLockError::WouldBlock) if began.elapsed() < PATIENCE => std::thread::sleep(STEP),
             Err(TryLockError::WouldBlock) => {
-                waiting();
+                told(Notice::Waiting);
                 return lock.lock();
             }
             Err(TryLockError::Error(e)) => return Err(e),
         }
     }
+}
+
+/// Copies a staged file into its place, whole or not at all.
+fn place(store: &Path, from: &Path, to: &Path, scene: &Path) -> Result<(), DiskError> {
+    let part = store.join(FOLDER).join(PLACING);
+    let action = "put the golden in its place";
+    fs::create_dir_all(scene).map_err(DiskError::io(scene, "create the folder"))?;
+    fs::copy(from, &part).map_err(DiskError::io(&part, action))?;
+    // Opened for writing: some systems sync nothing else.
+    let copied = File::options().write(true).open(&part).and_then(|f| f.sync_all());
+    copied.map_err(DiskError::io(&part, action))?;
+    fs::rename(&part, to).map_err(DiskError::io(to, action))
+}
+
+/// Removes what was being written when its writer was killed.
+fn sweep(folder: &Path) -> Result<(), DiskError> {
+    let list = |e| DiskError::io(folder, "list the folder")(e);
+    for entry in fs::read_dir(folder).map_err(list)? {
+        let entry = entry.map_err(list)?;
+        if is_part(&entry.file_name().to_string_lossy()) {
+            let path = entry.path();
+            fs::remove_file(&path).map_err(DiskError::io(&path, "remove what a killed command left"))?;
+        }
+    }
+    Ok(())
 }
 
 /// Removes what was staged.
@@ -262,9 +331,10 @@ fn sync(folder: &Path) -> Result<(), DiskError> {
 mod tests {
     use super::super::Store;
     use super::*;
+    use crate::layers::Layers;
 
-    fn layers(value: f32) -> Layers {
-        Layers::new([1, 1]).with("mean", vec![value])
+    fn image(value: f32) -> Vec<u8> {
+        Layers::new([1, 1]).with("mean", vec![value]).to_bytes().unwrap()
     }
 
     fn seen(store: &Store) -> Vec<(String, f32)> {
@@ -277,19 +347,20 @@ mod tests {
     }
 
     fn two(store: &Store, value: f32) -> Change {
-        let mut change = store.change(&|| ()).unwrap();
+        let mut change = store.change(&|_| ()).unwrap();
         for name in ["a.4.exr", "b.4.exr", "c.4.exr"] {
-            change.put(&Path::new("s").join(name), &layers(value)).unwrap();
+            change.put(&Path::new("s").join(name), &image(value)).unwrap();
         }
         change
     }
 
     /// Every state that a kill can leave, one by one: before the decision readers see
-    /// the old store, after it the new one, and the next change makes it so.
+    /// the old store, after it the new one, and the next change makes it so. Meanwhile
+    /// somebody may restore the old files.
     #[test]
     fn a_change_cut_short_anywhere_is_the_old_store_or_the_new_one() {
         let names = |value: f32| ["s/a.4.exr", "s/b.4.exr", "s/c.4.exr"].map(|n| (n.to_owned(), value)).to_vec();
-        for decided in [false, true] {
+        for (decided, restored) in [(false, false), (true, false), (true, true)] {
             for moved in 0..=3 {
                 let dir = tempfile::tempdir().unwrap();
                 let store = Store::new(dir.path());
@@ -302,18 +373,29 @@ mod tests {
                     change.decide().unwrap();
                     let staged = staged(dir.path());
                     for (from, to) in &change.journal.moves[..moved.min(2)] {
-                        fs::rename(staged.join(from), dir.path().join(to)).unwrap();
+                        fs::copy(staged.join(from), dir.path().join(to)).unwrap();
                     }
                     if moved == 3 {
                         fs::remove_file(dir.path().join("s/c.4.exr")).unwrap();
                     }
                 }
+                if restored {
+                    for name in ["s/a.4.exr", "s/b.4.exr", "s/c.4.exr"] {
+                        fs::write(dir.path().join(name), image(1.0)).unwrap();
+                    }
+                }
+                let stale = [".aogauge-x.part", PLACING].map(|n| dir.path().join(FOLDER).join(n));
+                stale.iter().for_each(|part| fs::write(part, "half").unwrap());
                 drop(change);
                 let expected = if decided { names(2.0)[..2].to_vec() } else { names(1.0) };
                 assert_eq!(seen(&store), expected, "decided {decided}, moved {moved}");
                 assert_eq!(store.reading(|s| s.interrupted).unwrap(), decided);
-                drop(store.change(&|| ()).unwrap());
+                let told = std::cell::Cell::new(None);
+                drop(store.change(&|notice| told.set(Some(notice))).unwrap());
+                let finished = decided.then_some(Notice::Finished { written: 2, removed: 1 });
+                assert_eq!(told.get(), finished, "restored {restored}");
                 assert_eq!(seen(&store), expected, "finished");
+                assert!(stale.iter().all(|part| !part.exists()), "what a kill left is swept");
                 assert!(!journal_path(dir.path()).exists() && !staged(dir.path()).exists());
             }
         }
@@ -335,9 +417,26 @@ mod tests {
             fs::write(dir.path().join("victim"), "alive").unwrap();
             fs::write(journal_path(store.folder()), journal).unwrap();
             assert!(store.reading(|_| ()).unwrap_err().to_string().contains("journal"), "{journal}");
-            assert!(store.change(&|| ()).is_err(), "{journal}");
+            assert!(store.change(&|_| ()).is_err(), "{journal}");
             assert!(dir.path().join("victim").exists());
         }
+    }
+
+    #[test]
+    fn a_change_whose_files_are_gone_is_an_error() {
+        let dir = tempfile::tempdir().unwrap();
+        let store = Store::new(dir.path());
+        two(&store, 1.0).commit().unwrap();
+        let change = two(&store, 2.0);
+        change.decide().unwrap();
+        drop(change);
+        fs::remove_file(staged(dir.path()).join("1.exr")).unwrap();
+        for error in [store.reading(|_| ()).unwrap_err(), store.change(&|_| ()).unwrap_err()] {
+            let error = error.to_string();
+            assert!(error.contains("1.exr") && error.contains("to give the change up"), "{error}");
+        }
+        fs::remove_dir_all(dir.path().join(FOLDER)).unwrap();
+        assert_eq!(seen(&store)[0].1, 1.0);
     }
 
     #[test]
@@ -348,8 +447,8 @@ mod tests {
         let said = std::sync::atomic::AtomicBool::new(false);
         std::thread::scope(|scope| {
             let second = scope.spawn(|| {
-                let waiting = || said.store(true, std::sync::atomic::Ordering::SeqCst);
-                let change = store.change(&waiting).unwrap();
+                let told = |notice| said.store(notice == Notice::Waiting, std::sync::atomic::Ordering::SeqCst);
+                let change = store.change(&told).unwrap();
                 drop(change);
                 Instant::now()
             });

@@ -41,7 +41,7 @@ pub struct Provenance {
     pub seed: u32,
     /// Independent replicates.
     pub replicates: u32,
-    /// Hash of the mean's pixels.
+    /// Hash of the mean's pixels as they were approved; reading checks it.
     pub pixel_hash: String,
     /// Why it was accepted.
     pub reason: String,
@@ -66,7 +66,8 @@ impl Golden {
     /// Reads a golden.
     ///
     /// # Errors
-    /// Where it is missing, broken, a Git LFS pointer, or lacks a layer or attribute.
+    /// Where it is missing, broken, a Git LFS pointer, lacks a layer or attribute, or its
+    /// mean is not the one that was approved.
     pub fn read(path: &Path) -> Result<Golden, DiskError> {
         let layers = Layers::read(path)?;
         let attribute = |name: &str| {
@@ -138,6 +139,16 @@ impl Golden {
             return Err(DiskError::content(
                 path,
                 "the golden's numbers make no sense: it needs a replicate or more, and finite means and variances",
+            ));
+        }
+        let (approved, found) = (&self.provenance.pixel_hash, pixel_hash(&image.mean));
+        if *approved != found {
+            return Err(DiskError::content(
+                path,
+                format!(
+                    "the golden's pixels are not those that were approved: their hash is {found}, its attribute \
+                     'pixel-hash' is {approved}; restore the file, or approve it anew"
+                ),
             ));
         }
         Ok(())

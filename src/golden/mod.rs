@@ -29,7 +29,7 @@ mod wording;
 pub use approve::{Approval, ApproveError, Approved, Selection, sampled};
 pub use artifact::Candidates;
 pub use assert::{CI_VARIABLES, GoldenError, Goldens, Held, assert_golden, check_golden};
-pub use change::Change;
+pub use change::{Change, Notice};
 pub use compare::{Comparison, MUST_SEE, Method, Moved, RegionShift, Seen, Terms, compare};
 pub use file::{Golden, Identity, Provenance, regions};
 pub use image::RgbImage;

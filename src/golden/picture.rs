@@ -37,7 +37,8 @@ pub enum Tolerance {
     /// What is hardly seen: limits on FLIP, SSIM and the greatest difference.
     Limits(Limits),
     /// Another sample of the same expectation may come: the chance that it is refused
-    /// is `alpha`. Needs an image of two replicates or more.
+    /// is `alpha`. Needs an image of two replicates or more, and so little noise that a
+    /// bias of [`MUST_SEE`](super::MUST_SEE) in a tile would be seen.
     Sampled {
         /// The false-alarm rate of one assertion, in (0, 1).
         alpha: f64,
@@ -197,6 +198,9 @@ impl Picture {
                     let terms =
                         Terms { alpha: *alpha, family: 1, limits: Limits::default(), regions: &BTreeMap::new() };
                     let found: Comparison = compare(a, b, &terms);
+                    if found.is_blind() {
+                        return Ok(Some(format!("{}; take more rays or replicates", found.line())));
+                    }
                     Ok((!found.passes()).then(|| found.line()))
                 }
                 _ => Err("a sampled tolerance needs an image of two replicates or more".into()),

@@ -1,7 +1,7 @@
 //! Removing goldens: of cases that are no more, and by name.
 
 use super::{
-    Slot, Store,
+    Notice, Slot, Store,
     store::{Snapshot, golden_cases},
 };
 use crate::{
@@ -52,36 +52,40 @@ impl Store {
     }
 
     /// Removes the goldens of cases that `named` does not hold, all of them or none, and
-    /// returns them. `waiting` as in [`Store::change`].
+    /// returns them. `told` as in [`Store::change`].
     ///
     /// # Errors
     /// Where the store cannot be listed or written.
-    pub fn prune(&self, named: &BTreeSet<Slot>, waiting: &dyn Fn()) -> Result<Vec<Slot>, DiskError> {
-        self.removing(|snapshot| orphans(snapshot, named), waiting)
+    pub fn prune(&self, named: &BTreeSet<Slot>, told: &dyn Fn(Notice)) -> Result<Vec<Slot>, DiskError> {
+        self.removing(|snapshot| orphans(snapshot, named), told)
     }
 
     /// Removes goldens, all of them or none. Returns those that the store does not have;
-    /// where there are any, nothing is removed. `waiting` as in [`Store::change`].
+    /// where there are any, nothing is removed. `told` as in [`Store::change`].
     ///
     /// # Errors
     /// Where the store cannot be listed or written.
-    pub fn remove(&self, slots: &BTreeSet<Slot>, waiting: &dyn Fn()) -> Result<Vec<Slot>, DiskError> {
+    pub fn remove(&self, slots: &BTreeSet<Slot>, told: &dyn Fn(Notice)) -> Result<Vec<Slot>, DiskError> {
         let mut missing = Vec::new();
         let wanted = |snapshot: &Snapshot| {
             missing = slots.iter().filter(|s| !snapshot.files.contains_key(s)).cloned().collect();
             if missing.is_empty() { slots.iter().cloned().collect() } else { Vec::new() }
         };
-        self.removing(wanted, waiting)?;
+        self.removing(wanted, told)?;
         Ok(missing)
     }
 
     /// Removes what `which` chooses of the store as it is once no other change is under
     /// way.
-    fn removing(&self, which: impl FnOnce(&Snapshot) -> Vec<Slot>, waiting: &dyn Fn()) -> Result<Vec<Slot>, DiskError> {
+    fn removing(
+        &self,
+        which: impl FnOnce(&Snapshot) -> Vec<Slot>,
+        told: &dyn Fn(Notice),
+    ) -> Result<Vec<Slot>, DiskError> {
         if !self.folder().exists() {
             return Ok(which(&Snapshot::default()));
         }
-        let mut change = self.change(waiting)?;
+        let mut change = self.change(told)?;
         let slots = which(&self.snapshot()?);
         for slot in &slots {
             change.remove(&slot.path());

@@ -1,7 +1,7 @@
 //! Images that a reviewer refused, so that the next one is told: `rejected.json` in the
 //! store, beside the goldens and committed with them.
 
-use super::Store;
+use super::{Notice, Store};
 use crate::disk::{DiskError, read_text, write_whole};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -61,29 +61,29 @@ impl Store {
         Ok(file.rejected)
     }
 
-    /// Keeps that an image was refused. The goldens stay as they are. `waiting` as in
+    /// Keeps that an image was refused. The goldens stay as they are. `told` as in
     /// [`Store::change`].
     ///
     /// # Errors
     /// Where the list cannot be read or written.
-    pub fn reject(&self, rejected: &Rejected, waiting: &dyn Fn()) -> Result<(), DiskError> {
-        self.change_rejections(waiting, |all| {
+    pub fn reject(&self, rejected: &Rejected, told: &dyn Fn(Notice)) -> Result<(), DiskError> {
+        self.change_rejections(told, |all| {
             all.retain(|r| !(r.case == rejected.case && r.pixel_hash == rejected.pixel_hash));
             all.push(rejected.clone());
         })
     }
 
     /// Forgets what was refused of a case whose image was approved.
-    pub(super) fn forget_rejections(&self, cases: &[String], waiting: &dyn Fn()) -> Result<(), DiskError> {
+    pub(super) fn forget_rejections(&self, cases: &[String], told: &dyn Fn(Notice)) -> Result<(), DiskError> {
         if self.rejections()?.iter().any(|r| cases.contains(&r.case)) {
-            self.change_rejections(waiting, |all| all.retain(|r| !cases.contains(&r.case)))?;
+            self.change_rejections(told, |all| all.retain(|r| !cases.contains(&r.case)))?;
         }
         Ok(())
     }
 
-    fn change_rejections(&self, waiting: &dyn Fn(), edit: impl FnOnce(&mut Vec<Rejected>)) -> Result<(), DiskError> {
+    fn change_rejections(&self, told: &dyn Fn(Notice), edit: impl FnOnce(&mut Vec<Rejected>)) -> Result<(), DiskError> {
         // Dropped uncommitted: it is here for its lock.
-        let _change = self.change(waiting)?;
+        let _change = self.change(told)?;
         let mut rejected = self.rejections()?;
         edit(&mut rejected);
         rejected.sort_by(|a, b| (&a.case, &a.pixel_hash).cmp(&(&b.case, &b.pixel_hash)));
@@ -107,12 +107,12 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let store = Store::new(dir.path());
         assert_eq!(store.rejections().unwrap(), []);
-        store.reject(&rejected("b/x/cpu/4", "1", "too dark"), &|| ()).unwrap();
-        store.reject(&rejected("a/x/cpu/4", "2", "NaN | <b>"), &|| ()).unwrap();
-        store.reject(&rejected("b/x/cpu/4", "1", "far too dark"), &|| ()).unwrap();
+        store.reject(&rejected("b/x/cpu/4", "1", "too dark"), &|_| ()).unwrap();
+        store.reject(&rejected("a/x/cpu/4", "2", "NaN | <b>"), &|_| ()).unwrap();
+        store.reject(&rejected("b/x/cpu/4", "1", "far too dark"), &|_| ()).unwrap();
         let expected = [rejected("a/x/cpu/4", "2", "NaN | <b>"), rejected("b/x/cpu/4", "1", "far too dark")];
         assert_eq!(store.rejections().unwrap(), expected);
-        store.forget_rejections(&["b/x/cpu/4".to_owned()], &|| ()).unwrap();
+        store.forget_rejections(&["b/x/cpu/4".to_owned()], &|_| ()).unwrap();
         assert_eq!(store.rejections().unwrap(), expected[..1]);
         for text in ["", "{}", r#"{"version":2,"rejected":[]}"#, r#"{"version":1,"rejected":[{"case":1}]}"#] {
             fs::write(dir.path().join(FILE), text).unwrap();

@@ -3,7 +3,7 @@
 
 use super::{
     Golden,
-    change::{self, Change, Overlay},
+    change::{self, Change, Notice, Overlay},
 };
 use crate::{
     disk::DiskError,
@@ -57,8 +57,10 @@ pub struct Entry {
     pub file: PathBuf,
     /// Bytes on disk.
     pub bytes: u64,
-    /// What it says of itself, or what is wrong.
-    pub golden: Result<About, String>,
+    /// What it says of itself; null where it cannot be read.
+    pub golden: Option<About>,
+    /// Why it cannot be read; null where it can.
+    pub unreadable: Option<String>,
 }
 
 /// What a golden says of itself.
@@ -162,14 +164,14 @@ impl Store {
         }
     }
 
-    /// Begins a change. Waits while others read or change the store, and calls
-    /// `waiting` where that takes more than a second. Finishes what a killed change had
-    /// decided.
+    /// Begins a change. Waits while others read or change the store, and says so by
+    /// `told` where that takes more than a second. Finishes first what a killed change
+    /// had decided, and says that too.
     ///
     /// # Errors
     /// Where the store cannot be written or locked.
-    pub fn change(&self, waiting: &dyn Fn()) -> Result<Change, DiskError> {
-        Change::begin(&self.folder, waiting)
+    pub fn change(&self, told: &dyn Fn(Notice)) -> Result<Change, DiskError> {
+        Change::begin(&self.folder, told)
     }
 
     /// The files as they are now: whole only while a lock is held.
@@ -199,6 +201,14 @@ impl Store {
         Ok(Snapshot { files, interrupted: overlay.interrupted })
     }
 
+    /// Whether a change was cut short after its decision, which the next one finishes.
+    ///
+    /// # Errors
+    /// Where the store cannot be listed.
+    pub fn is_interrupted(&self) -> Result<bool, DiskError> {
+        self.reading(|snapshot| snapshot.interrupted)
+    }
+
     /// Every golden with its provenance, in order.
     ///
     /// # Errors
@@ -210,11 +220,13 @@ impl Store {
                 provenance: g.provenance,
                 tolerance: g.limits.map(|l| l.to_string()),
             };
-            let entry = |(slot, path): (&Slot, &PathBuf)| Entry {
-                slot: slot.clone(),
-                file: self.path(slot),
-                bytes: fs::metadata(path).map_or(0, |m| m.len()),
-                golden: Golden::read(path).map(about).map_err(|e| e.to_string()),
+            let entry = |(slot, path): (&Slot, &PathBuf)| {
+                let (golden, unreadable) = match Golden::read(path) {
+                    Ok(golden) => (Some(about(golden)), None),
+                    Err(e) => (None, Some(e.to_string())),
+                };
+                let bytes = fs::metadata(path).map_or(0, |m| m.len());
+                Entry { slot: slot.clone(), file: self.path(slot), bytes, golden, unreadable }
             };
             snapshot.files.iter().map(entry).collect()
         })

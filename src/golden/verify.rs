@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 pub const ALPHA: f64 = 0.01;
 
 /// Version of what `golden verify`, `list` and `size` print as JSON.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// What came of one case.
 #[derive(Clone, Debug, Serialize, JsonSchema)]

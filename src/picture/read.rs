@@ -2,21 +2,18 @@
 //! planes of numbers with a stated encoding.
 
 use super::{
+    channel::Group,
     read_exr::{self, exr_size},
-    read_png, tiff_lists,
+    read_jpeg, read_png, read_tiff, tiff_lists,
 };
 use crate::{
-    claim::{self, MAX_BYTES, MAX_RATIO, MAX_SIDE},
+    claim::{self, MAX_BYTES, MAX_SIDE},
     disk::DiskError,
     layers::load,
     metrics::image::{Encoding, Image},
 };
-use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::{io::Cursor, path::Path};
-
-/// What a JPEG may decode to, bytes, however small it is. It needs no more: a block of
-/// 8 x 8 samples takes a bit or more, so RGB of one colour is 1536 bytes for a byte of file.
-const JPEG_BYTES: u64 = 4 << 20;
 
 /// The first bytes of an OpenEXR file.
 const EXR: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
@@ -27,7 +24,8 @@ pub const EXTENSIONS: [&str; 7] = ["exr", "png", "jpg", "jpeg", "hdr", "tif", "t
 /// Which layers of an OpenEXR file to take.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LayerChoice<'a> {
-    /// Of the first part: R, G and B, else Y, else `mean`, else the only channel.
+    /// Of the first part: R, G and B, else Y (not beside X and Z), else `mean`, else the
+    /// only layer there is, an alpha beside it not counted.
     #[default]
     Main,
     /// A channel, or three of them: `NAME.R`, `.G`, `.B`.
@@ -48,6 +46,19 @@ pub struct Found {
     pub origin: [i32; 2],
     /// The alpha channel that was left out.
     pub alpha: Alpha,
+    /// Channels of the file that were not taken, but for an alpha of 1 everywhere.
+    pub others: Vec<String>,
+}
+
+/// What an image is by its header, before it is decoded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Claim {
+    /// Width and height, pixels; None where parts of an OpenEXR file differ.
+    pub size: Option<[usize; 2]>,
+    /// Bytes that its samples take as they are stored.
+    pub stored: u64,
+    /// Bytes that its colours take as 32-bit floats; of OpenEXR all channels.
+    pub floats: u64,
 }
 
 /// An alpha channel that is left out.
@@ -125,19 +136,84 @@ pub fn decode(
     if matches!(choice, LayerChoice::Named(_)) {
         return Err(DiskError::content(path, "only OpenEXR images have layers"));
     }
+    let claimed = claim(path, bytes)?.floats;
+    if claimed > MAX_BYTES {
+        let why = format!("as 32-bit floats it takes {claimed} bytes, at most {MAX_BYTES} can be taken");
+        return Err(broken(path, &why));
+    }
     let samples = decode_samples(path, bytes)?;
     let floats = matches!(samples.values, Values::F32(_));
     let encoding = encoding.unwrap_or(if floats { Encoding::Linear } else { Encoding::Srgb });
-    let claimed = samples.size[0] as u64 * samples.size[1] as u64 * samples.colors() as u64 * 4;
-    if claimed > MAX_BYTES {
-        return Err(broken(
-            path,
-            &format!("as 32-bit floats it takes {claimed} bytes, at most {MAX_BYTES} can be taken"),
-        ));
-    }
     let (planes, alpha) = (samples.planes(), samples.alpha());
     let image = Image::new(samples.size, planes, encoding).map_err(|e| DiskError::content(path, e.to_string()))?;
-    Ok(vec![Found { image, layer: String::new(), origin: [0, 0], alpha }])
+    let others = if alpha == Alpha::Varied { vec!["A".to_owned()] } else { Vec::new() };
+    Ok(vec![Found { image, layer: String::new(), origin: [0, 0], alpha, others }])
+}
+
+/// The channels of an OpenEXR file as they are stored: those of the layers asked for, or
+/// without `choice` all of the file together.
+///
+/// # Errors
+/// As [`read`], and for other formats.
+pub fn channels(path: &Path, bytes: &[u8], choice: Option<LayerChoice<'_>>) -> Result<Vec<Group>, DiskError> {
+    if is_exr(path, bytes) {
+        return read_exr::stored(path, bytes, choice);
+    }
+    Err(DiskError::content(path, "only OpenEXR images have layers"))
+}
+
+/// What an image claims to be, by its header alone: for deciding whether to decode it.
+///
+/// # Errors
+/// Where the header cannot be read, or claims more than so many bytes of file may hold.
+pub fn claim(path: &Path, bytes: &[u8]) -> Result<Claim, DiskError> {
+    if is_exr(path, bytes) {
+        let meta = claim::exr(path, bytes)?;
+        let mut sizes = meta.headers.iter().map(|h| [h.layer_size.0, h.layer_size.1]);
+        let size = sizes.next().filter(|first| sizes.all(|size| size == *first));
+        let bytes = u64::try_from(claim::of_exr(&meta)).unwrap_or(u64::MAX);
+        return Ok(Claim { size, stored: bytes, floats: bytes });
+    }
+    let of = |[width, height]: [usize; 2], channels: usize, bytes: usize| {
+        let pixels = width as u64 * height as u64;
+        let colors = if channels < 3 { 1 } else { 3 };
+        let (stored, floats) = (pixels * (channels * bytes) as u64, pixels * colors * 4);
+        Claim { size: Some([width, height]), stored, floats }
+    };
+    let reader = reader(path, bytes)?;
+    match reader.format() {
+        Some(ImageFormat::Png) => {
+            let (size, channels, bytes) = read_png::shape(path, bytes)?;
+            return Ok(of(size, channels, bytes));
+        }
+        Some(ImageFormat::Jpeg) => {
+            let header = read_jpeg::header(path, bytes)?;
+            return Ok(of(header.size, header.channels, 1));
+        }
+        Some(ImageFormat::Tiff) => {
+            if let Some(grey) = read_tiff::grey32(path, bytes)? {
+                return Ok(of(grey.size, 1, 4));
+            }
+        }
+        _ => {}
+    }
+    let decoder = reader.into_decoder().map_err(|e| broken(path, &e))?;
+    let ((width, height), color) = (decoder.dimensions(), decoder.color_type());
+    let channels = usize::from(color.channel_count());
+    let size = with_pixels(path, [width as usize, height as usize])?;
+    Ok(of(size, channels, usize::from(color.bytes_per_pixel()) / channels.max(1)))
+}
+
+/// Width and height of an image that is whole, from its first byte to its last: it is
+/// decoded, and its pixels are dropped.
+///
+/// # Errors
+/// As [`read`].
+pub fn check_whole(path: &Path, bytes: &[u8]) -> Result<[usize; 2], DiskError> {
+    if !is_exr(path, bytes) && reader(path, bytes)?.format() == Some(ImageFormat::Png) {
+        return read_png::check_whole(path, bytes);
+    }
+    decode_samples(path, bytes).map(|samples| samples.size)
 }
 
 impl Samples {
@@ -182,10 +258,18 @@ pub fn decode_samples(path: &Path, bytes: &[u8]) -> Result<Samples, DiskError> {
     if is_exr(path, bytes) {
         return Err(DiskError::content(path, "an OpenEXR image has layers, not samples"));
     }
-    let decoded = match reader(path, bytes)? {
-        reader if reader.format() == Some(ImageFormat::Png) => return read_png::decode(path, bytes),
-        reader => decode_dynamic(path, reader)?,
-    };
+    let reader = reader(path, bytes)?;
+    match reader.format() {
+        Some(ImageFormat::Png) => return read_png::decode(path, bytes),
+        Some(ImageFormat::Jpeg) => return read_jpeg::decode(path, bytes),
+        Some(ImageFormat::Tiff) => {
+            if let Some(grey) = read_tiff::grey32(path, bytes)? {
+                return grey.decode(path);
+            }
+        }
+        _ => {}
+    }
+    let decoded = decode_dynamic(path, reader)?;
     let size = [decoded.width() as usize, decoded.height() as usize];
     let channels = usize::from(decoded.color().channel_count());
     let values = match decoded {
@@ -207,20 +291,15 @@ pub fn decode_samples(path: &Path, bytes: &[u8]) -> Result<Samples, DiskError> {
     Ok(Samples { size, channels, values })
 }
 
-/// Width and height by the header alone.
+/// Width and height by the header alone; of an OpenEXR file those of its first part.
 ///
 /// # Errors
 /// Where the header cannot be read.
 pub fn size(path: &Path, bytes: &[u8]) -> Result<[usize; 2], DiskError> {
-    if is_exr(path, bytes) {
-        return exr_size(path, bytes);
+    match claim(path, bytes)?.size {
+        Some(size) => Ok(size),
+        None => exr_size(path, bytes),
     }
-    let reader = reader(path, bytes)?;
-    if reader.format() == Some(ImageFormat::Png) {
-        return read_png::size(path, bytes);
-    }
-    let (width, height) = reader.into_dimensions().map_err(|e| broken(path, &e))?;
-    with_pixels(path, [width as usize, height as usize])
 }
 
 /// The size again, where there is any pixel.
@@ -265,10 +344,7 @@ fn reader<'a>(path: &Path, bytes: &'a [u8]) -> Result<ImageReader<Cursor<&'a [u8
     let mut reader = reader.with_guessed_format().map_err(|e| broken(path, &e))?;
     let mut limits = Limits::default();
     (limits.max_image_width, limits.max_image_height) = (Some(MAX_SIDE), Some(MAX_SIDE));
-    limits.max_alloc = Some(match reader.format() {
-        Some(ImageFormat::Jpeg) => (bytes.len() as u64).saturating_mul(MAX_RATIO).clamp(JPEG_BYTES, MAX_BYTES),
-        _ => claim::most(bytes.len()),
-    });
+    limits.max_alloc = Some(claim::most(bytes.len()));
     reader.limits(limits);
     // Before the decoder sees them: it reads lists before it knows its limits.
     match tiff_lists::beyond_the_end(bytes).filter(|_| reader.format() == Some(ImageFormat::Tiff)) {

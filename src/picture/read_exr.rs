@@ -1,23 +1,19 @@
 //! OpenEXR of any program: several parts, any channel names, data windows anywhere.
 
-use super::read::{Alpha, Found, LayerChoice};
+use super::{
+    channel::{Channel, Group, Numbers},
+    read::{Alpha, Found, LayerChoice},
+};
 use crate::{
     claim,
     disk::DiskError,
     metrics::image::{Encoding, Image},
 };
-use exr::prelude::{ReadChannels, ReadLayers};
+use exr::prelude::{FlatSamples, ReadChannels, ReadLayers};
 use std::{collections::BTreeMap, io::Cursor, path::Path};
 
 /// The ending of a grey layer's channel, as OpenEXR viewers expect it.
 const GREY: &str = ".Y";
-
-/// A channel with the shape of its part.
-struct Channel {
-    size: [usize; 2],
-    origin: [i32; 2],
-    values: Vec<f32>,
-}
 
 /// All channels of a file by name. Where it has several parts, the part's name and a
 /// dot stand before the channel's.
@@ -52,20 +48,33 @@ pub(super) fn decode(
     choice: LayerChoice<'_>,
     encoding: Encoding,
 ) -> Result<Vec<Found>, DiskError> {
-    claim::exr(path, bytes)?;
     let mut channels = Channels::read(path, bytes)?;
-    let wanted = match choice {
-        LayerChoice::Main => vec![channels.main(path)?],
-        LayerChoice::Named(name) => vec![channels.named(path, name)?],
-        LayerChoice::All => channels.layers(),
-    };
-    let all = choice == LayerChoice::All;
+    let (all, wanted) = (choice == LayerChoice::All, channels.wanted(path, choice)?);
     let take = |names: Vec<String>| {
         // Where all layers are taken, alpha is one of them.
-        let alpha = if all { Alpha::None } else { channels.alpha(&names) };
-        Ok(Found { alpha, ..channels.take(path, &names, encoding)? })
+        let (alpha, others) =
+            if all { (Alpha::None, Vec::new()) } else { (channels.alpha(&names), channels.beside(&names)) };
+        Ok(Found { alpha, others, ..channels.take(path, &names, encoding)? })
     };
     wanted.into_iter().map(take).collect()
+}
+
+/// Reads the channels of the layers asked for as they are stored; without `choice` all
+/// of the file together.
+pub(super) fn stored(path: &Path, bytes: &[u8], choice: Option<LayerChoice<'_>>) -> Result<Vec<Group>, DiskError> {
+    let mut channels = Channels::read(path, bytes)?;
+    let Some(choice) = choice else {
+        return Ok(vec![Group { layer: String::new(), channels: channels.all.into_values().collect() }]);
+    };
+    let wanted = channels.wanted(path, choice)?;
+    let group = |names: Vec<String>| {
+        let layer = title(&names);
+        let called: &[&str] = if names.len() == 3 { &["R", "G", "B"] } else { &["Y"] };
+        let taken = names.iter().filter_map(|name| channels.all.remove(name));
+        let channels = taken.zip(called).map(|(c, name)| Channel { name: (*name).to_owned(), ..c }).collect();
+        Group { layer, channels }
+    };
+    Ok(wanted.into_iter().map(group).collect())
 }
 
 /// The names of the three channels of a colour layer.
@@ -73,8 +82,24 @@ fn three(prefix: &str) -> Vec<String> {
     ["R", "G", "B"].map(|c| format!("{prefix}{c}")).to_vec()
 }
 
+/// What reports call a layer of these channels.
+fn title(names: &[String]) -> String {
+    match names {
+        [one] => one.clone(),
+        [red, ..] => red.strip_suffix('R').unwrap_or(red).to_owned() + "RGB",
+        [] => String::new(),
+    }
+}
+
+/// The name that a layer of these channels is asked for by.
+fn asked_by(names: &[String]) -> &str {
+    let first = names.first().map_or("", String::as_str);
+    if names.len() == 3 { first.strip_suffix(".R").unwrap_or(first) } else { first }
+}
+
 impl Channels {
     fn read(path: &Path, bytes: &[u8]) -> Result<Self, DiskError> {
+        claim::exr(path, bytes)?;
         let image = exr::prelude::read()
             .no_deep_data()
             .largest_resolution_level()
@@ -93,11 +118,13 @@ impl Channels {
             for channel in part.channel_data.list {
                 let name = channel.name.to_string();
                 let name = prefix.clone() + name.strip_suffix(GREY).unwrap_or(&name);
-                let channel = Channel {
-                    size: [part.size.0, part.size.1],
-                    origin: [at.0, at.1],
-                    values: channel.sample_data.values_as_f32().collect(),
+                let numbers = match channel.sample_data {
+                    FlatSamples::F16(v) => Numbers::Float(v.into_iter().map(exr::prelude::f16::to_f32).collect()),
+                    FlatSamples::F32(v) => Numbers::Float(v),
+                    FlatSamples::U32(v) => Numbers::Unsigned(v),
                 };
+                let (size, origin) = ([part.size.0, part.size.1], [at.0, at.1]);
+                let channel = Channel { name: name.clone(), size, origin, numbers };
                 if channels.all.insert(name.clone(), channel).is_some() {
                     return Err(DiskError::content(path, format!("there are two layers '{name}'")));
                 }
@@ -113,8 +140,17 @@ impl Channels {
         wanted.iter().all(|w| self.all.contains_key(w))
     }
 
+    fn wanted(&self, path: &Path, choice: LayerChoice<'_>) -> Result<Vec<Vec<String>>, DiskError> {
+        Ok(match choice {
+            LayerChoice::Main => vec![self.main(path)?],
+            LayerChoice::Named(name) => vec![self.named(path, name)?],
+            LayerChoice::All => self.layers(),
+        })
+    }
+
+    /// The names that layers can be asked for by.
     fn names(&self) -> String {
-        self.all.keys().cloned().collect::<Vec<_>>().join(", ")
+        self.layers().iter().map(|names| asked_by(names)).collect::<Vec<_>>().join(", ")
     }
 
     fn main(&self, path: &Path) -> Result<Vec<String>, DiskError> {
@@ -122,11 +158,18 @@ impl Channels {
         if self.has(&colors) {
             return Ok(colors);
         }
+        // With X and Z, Y is one of the three of CIE XYZ.
+        let is_xyz = self.has(&["X", "Y", "Z"].map(|n| self.first.clone() + n));
         let one = ["Y", "mean"].map(|n| vec![self.first.clone() + n]);
-        match one.into_iter().find(|n| self.has(n)) {
-            Some(one) => Ok(one),
-            None if self.all.len() == 1 => Ok(self.all.keys().cloned().collect()),
-            None => Err(DiskError::content(path, format!("several layers, name one of them: {}", self.names()))),
+        if let Some(one) = one.into_iter().find(|n| self.has(n) && !(is_xyz && n[0].ends_with('Y'))) {
+            return Ok(one);
+        }
+        let mut layers = self.layers();
+        let alphas: Vec<String> = layers.iter().filter_map(|names| self.alpha_of(names)).collect();
+        layers.retain(|names| names.len() > 1 || !alphas.contains(&names[0]));
+        match layers.pop() {
+            Some(only) if layers.is_empty() => Ok(only),
+            _ => Err(DiskError::content(path, format!("several layers, name one of them: {}", self.names()))),
         }
     }
 
@@ -152,24 +195,32 @@ impl Channels {
         layers
     }
 
-    /// Of the channel `A` beside a layer of colours, or beside `Y`.
+    /// The channel `A` beside a layer of colours, or beside `Y`.
+    fn alpha_of(&self, names: &[String]) -> Option<String> {
+        let prefix = names.first()?.strip_suffix(if names.len() == 3 { 'R' } else { 'Y' })?;
+        let alpha = format!("{prefix}A");
+        ((prefix.is_empty() || prefix.ends_with('.')) && self.all.contains_key(&alpha)).then_some(alpha)
+    }
+
     fn alpha(&self, names: &[String]) -> Alpha {
-        let prefix = names.first().and_then(|n| n.strip_suffix(if names.len() == 3 { 'R' } else { 'Y' }));
-        let alpha = prefix.filter(|p| p.is_empty() || p.ends_with('.')).and_then(|p| self.all.get(&format!("{p}A")));
-        alpha.map_or(Alpha::None, |a| Alpha::of(a.values.iter().map(|&v| v == 1.0)))
+        let alpha = self.alpha_of(names).and_then(|name| self.all.get(&name));
+        alpha.map_or(Alpha::None, |a| if a.numbers.are_one() { Alpha::One } else { Alpha::Varied })
+    }
+
+    /// The channels that are not taken with these; not an alpha of 1 everywhere, which
+    /// says nothing.
+    fn beside(&self, names: &[String]) -> Vec<String> {
+        let solid = self.alpha_of(names).filter(|_| self.alpha(names) == Alpha::One);
+        self.all.keys().filter(|name| !names.contains(name) && Some(*name) != solid.as_ref()).cloned().collect()
     }
 
     fn take(&mut self, path: &Path, names: &[String], encoding: Encoding) -> Result<Found, DiskError> {
-        let layer = match names {
-            [one] => one.clone(),
-            [red, ..] => red.strip_suffix('R').unwrap_or(red).to_owned() + "RGB",
-            [] => String::new(),
-        };
+        let layer = title(names);
         let channels: Vec<Channel> = names.iter().filter_map(|name| self.all.remove(name)).collect();
         let (size, origin) = channels.first().map_or(([0, 0], [0, 0]), |c| (c.size, c.origin));
-        let planes = channels.into_iter().map(|c| c.values).collect();
+        let planes = channels.into_iter().map(|c| c.numbers.into_floats()).collect();
         let image = Image::new(size, planes, encoding)
             .map_err(|e| DiskError::content(path, format!("layer '{layer}': {e}")))?;
-        Ok(Found { image, layer, origin, alpha: Alpha::None })
+        Ok(Found { image, layer, origin, alpha: Alpha::None, others: Vec::new() })
     }
 }

@@ -42,11 +42,23 @@ fn raw_bytes(info: &Info<'_>) -> u64 {
     (u64::from(info.width) * bits).div_ceil(8) * u64::from(info.height)
 }
 
-/// Width and height by the header.
-pub(super) fn size(path: &Path, bytes: &[u8]) -> Result<[usize; 2], DiskError> {
-    let mut decoder = decoder(path, bytes)?;
-    let info = decoder.read_header_info().map_err(|e| broken(path, &e))?;
-    Ok([info.width as usize, info.height as usize])
+/// Width and height, channels and bytes of a sample as they are decoded, by what stands
+/// before the pixels.
+pub(super) fn shape(path: &Path, bytes: &[u8]) -> Result<([usize; 2], usize, usize), DiskError> {
+    let reader = decoder(path, bytes)?.read_info().map_err(|e| broken(path, &e))?;
+    let (color, depth) = reader.output_color_type();
+    let size = [reader.info().width as usize, reader.info().height as usize];
+    Ok((size, color.samples(), if depth == BitDepth::Sixteen { 2 } else { 1 }))
+}
+
+/// Width and height of a file that is whole: its rows are decoded one by one, and dropped.
+pub(super) fn check_whole(path: &Path, bytes: &[u8]) -> Result<[usize; 2], DiskError> {
+    let mut reader = decoder(path, bytes)?.read_info().map_err(|e| broken(path, &e))?;
+    let size = [reader.info().width as usize, reader.info().height as usize];
+    while reader.next_row().map_err(|e| broken(path, &e))?.is_some() {}
+    // To the end of the file: a checksum stands behind the last row.
+    reader.finish().map_err(|e| broken(path, &e))?;
+    Ok(size)
 }
 
 /// The samples, of fewer than 8 bits as codes of 8.
@@ -60,7 +72,10 @@ pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<Samples, DiskError> {
         ColorType::Indexed => return Err(broken(path, &"it has no palette")),
         color => color.samples(),
     };
-    let mut read = |buffer: &mut [u8]| reader.next_frame(buffer).map(drop).map_err(|e| broken(path, &e));
+    let mut read = |buffer: &mut [u8]| {
+        let all = reader.next_frame(buffer).and_then(|_| reader.finish());
+        all.map_err(|e| broken(path, &e))
+    };
     let values = if depth == BitDepth::Sixteen {
         let mut codes = vec![0u16; length / 2];
         read(bytemuck::cast_slice_mut(&mut codes))?;

@@ -21,7 +21,7 @@
 use super::{ReportError, in_a_line};
 use crate::{
     gate::{Outcome, Verdict, words},
-    record::{IdleGate, Record},
+    record::{End, IdleGate, Record},
     untrusted::line,
 };
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
@@ -58,7 +58,8 @@ fn of_run(record: &Record) -> TestSuite {
     let mut suite = suite(record, &record.suite.name);
     let complete = record.incomplete.as_ref().map(|why| error("incomplete", why));
     let mut tests = vec![TestCase::new("the run is complete", complete.unwrap_or_else(TestCaseStatus::success))];
-    tests.extend(record.idle_gates.iter().map(|g| TestCase::new(line(&g.gate), of_idle(g))));
+    let excuse = record.end() != End::Nothing;
+    tests.extend(record.idle_gates.iter().map(|g| TestCase::new(line(&g.gate), of_idle(g, excuse))));
     for mut test in tests {
         test.set_classname(line(&record.suite.name)).set_time(Duration::ZERO);
         suite.add_test_case(test);
@@ -145,9 +146,10 @@ fn of_verdict(verdict: &Verdict, family: usize) -> TestCaseStatus {
     }
 }
 
-fn of_idle(gate: &IdleGate) -> TestCaseStatus {
+/// Excuses do not help where nothing at all was judged.
+fn of_idle(gate: &IdleGate, excuse: bool) -> TestCaseStatus {
     let why = format!("nothing was held against it: {}", gate.reason);
-    if gate.excused { skipped("not-run", &why) } else { failure("inconclusive", &why, &[]) }
+    if gate.excused && excuse { skipped("not-run", &why) } else { failure("inconclusive", &why, &[]) }
 }
 
 fn failure(kind: &str, message: &str, explanation: &[String]) -> TestCaseStatus {

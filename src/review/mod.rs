@@ -130,13 +130,14 @@ impl Review {
         let message = match decision {
             Decision::Approve => {
                 let only = Selection::Case(case);
-                let approval = Approval { reason, only, renderer: &renderer, name: None, limits };
-                self.store.approve(&self.folder, &self.record, &approval, &|| ())?;
+                let (name, most, dry_run) = (None, None, false);
+                let approval = Approval { reason, only, renderer: &renderer, name, limits, most, dry_run };
+                self.store.approve(&self.folder, &self.record, &approval, &|_| ())?;
                 format!("Approved: {golden}.")
             }
             Decision::Reject => {
                 let rejected = Rejected { case: case.to_owned(), pixel_hash: hash, reason: reason.to_owned() };
-                self.store.reject(&rejected, &|| ())?;
+                self.store.reject(&rejected, &|_| ())?;
                 format!("Rejected: {golden} stays as it is.")
             }
         };

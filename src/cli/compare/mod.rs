@@ -6,8 +6,8 @@ mod table;
 use super::{Exit, Failure, json, print, run::bar, tell};
 use crate::{
     compare::{
-        CompareError, Drawn, Layer, Limit, Limits, Mask, Mode, Outcome, PairReport, Rect, Region, Settings, compare,
-        side_by_side, write_maps,
+        CompareError, Drawn, Layer, Limit, Limits, Mask, Mode, Outcome, Own, PairReport, Rect, Region, Settings,
+        compare, side_by_side, write_maps,
     },
     layers::write_png,
     metrics::image::{DEFAULT_PPD, Encoding, Options},
@@ -25,6 +25,8 @@ aogauge compare references/ renders/ --limits limits.toml --maps maps --format j
 aogauge compare a.png b.png --exact --fail 'differing<=0'\n  \
 aogauge compare a.png b.png --exact --diff differing.png\n  \
 aogauge compare a.exr b.exr --all-layers --ignore 0,0,320,40 --maps maps\n  \
+aogauge compare a.exr:beauty b.exr\n  \
+aogauge compare a.png b.exr --reference-encoding srgb\n  \
 aogauge compare base/ reports/latest/ --format markdown > comment.md\n\n\
 OpenEXR, PNG, JPEG, Radiance HDR and TIFF. docs/compare.md tells how to use it in CI, docs/metrics.md what each\n\
 metric sees and misses. Limits are on mean-error, mae, mse, rmse, psnr, relative-mse, smape, ssim, ms-ssim, flip,\n\
@@ -36,10 +38,10 @@ be compared, 4 no image to compare, 6 a metric under a limit has no value.\n\
 Of two records (folders with a record.json): what changed of verdicts, metrics, images and times; 0 no verdict got\n\
 worse, 1 one did, 2 a record cannot be read, 4 no case in common, 5 cases are lost.")]
 pub struct Args {
-    /// What to compare with: an image, a folder of images, or a record.
+    /// What to compare with: an image, FILE.exr:LAYER, a folder of images, or a record.
     reference: PathBuf,
-    /// What is compared: an image, a folder with images of the same relative paths, or a
-    /// record.
+    /// What is compared: an image, FILE.exr:LAYER, a folder with images of the same relative
+    /// paths, or a record.
     test: PathBuf,
     /// Compare the images of two records as folders of images.
     #[arg(long)]
@@ -63,15 +65,23 @@ pub struct Args {
     /// Images that the test folder lacks, or cases that the record lacks, do not fail.
     #[arg(long)]
     allow_missing: bool,
-    /// The layer of OpenEXR images; R, G and B, else Y, else mean unless given.
+    /// The layer of OpenEXR images; R, G and B, else Y, else mean unless given, with --exact
+    /// all channels.
     #[arg(long, conflicts_with = "all_layers")]
     layer: Option<String>,
     /// Every layer of OpenEXR images, each for itself.
     #[arg(long)]
     all_layers: bool,
     /// What the numbers stand for; integers are sRGB codes and floats linear unless given.
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, conflicts_with = "exact")]
     encoding: Option<Meaning>,
+    /// The same of the reference alone. Where the two images then differ, both are compared
+    /// as linear light.
+    #[arg(long, value_enum, conflicts_with = "exact")]
+    reference_encoding: Option<Meaning>,
+    /// The same of the test image alone.
+    #[arg(long, value_enum, conflicts_with = "exact")]
+    test_encoding: Option<Meaning>,
     /// An image that weighs pixels, black 0 and white 1: FILE, FILE.exr:LAYER, or a
     /// folder of such images with the relative paths of those compared.
     #[arg(long)]
@@ -178,7 +188,7 @@ fn tolerance(text: &str) -> Result<f64, String> {
 }
 
 impl Args {
-    fn settings(&self) -> Result<Settings, Failure> {
+    fn settings(&self, own_layers: [Option<String>; 2]) -> Result<Settings, Failure> {
         let limits = self.limits.as_deref().map(Limits::load).transpose()?.unwrap_or_default();
         let layer = match &self.layer {
             Some(name) => Layer::Named(name.clone()),
@@ -190,6 +200,13 @@ impl Args {
             options: Options { ppd: self.ppd, hdr: self.hdr, exposures: None, ssimulacra2: self.ssimulacra2 },
             layer,
             encoding: self.encoding.map(Encoding::from),
+            own: {
+                let [reference, test] = own_layers;
+                [
+                    Own { layer: reference, encoding: self.reference_encoding.map(Encoding::from) },
+                    Own { layer: test, encoding: self.test_encoding.map(Encoding::from) },
+                ]
+            },
             mask: self.mask.as_deref().map(Mask::parse),
             region: Region { ignore: self.ignore.clone(), only: self.only.clone(), crop: self.crop },
             tolerance: self.tolerance,
@@ -226,13 +243,22 @@ fn file_name(layer: &str) -> String {
     name
 }
 
+/// A file and the layer that is named of it, `FILE:LAYER`; what exists as it is written
+/// has none.
+fn with_layer(path: PathBuf) -> (PathBuf, Option<String>) {
+    match path.to_str().map(Mask::parse) {
+        Some(Mask { path, layer: Some(layer) }) => (path, Some(layer)),
+        _ => (path, None),
+    }
+}
+
 /// Compares two images, two folders or two records.
 pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     if args.as_records() {
         return records::execute(args);
     }
-    let [reference, test] = args.as_images()?;
-    let settings = args.settings()?;
+    let [(reference, layer), (test, test_layer)] = args.as_images()?.map(with_layer);
+    let settings = args.settings([layer, test_layer])?;
     let folders = args.reference.is_dir();
     if args.diff.is_some() && (folders || args.all_layers) {
         return Err(Failure::usage(

@@ -62,6 +62,8 @@ impl Args {
             ("--layer", self.layer.is_some()),
             ("--all-layers", self.all_layers),
             ("--encoding", self.encoding.is_some()),
+            ("--reference-encoding", self.reference_encoding.is_some()),
+            ("--test-encoding", self.test_encoding.is_some()),
             ("--mask", self.mask.is_some()),
             ("--ignore", !self.ignore.is_empty()),
             ("--only", !self.only.is_empty()),

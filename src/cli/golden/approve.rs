@@ -1,6 +1,6 @@
 //! `aogauge golden approve`
 
-use super::{Exit, Failure, LARGE, bytes, nothing, print, tell, waiting, warn_if_large};
+use super::{Exit, Failure, bytes, nothing, notice, print, size::parse, tell};
 use crate::{
     golden::{Approval, ApproveError, Candidates, Limits, Selection, Store, check_golden_name},
     record::Record,
@@ -12,7 +12,8 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  aogauge golden approve reports/latest --reason \"first goldens\"\n  \
 aogauge golden approve artifact.zip --reason \"secondary rays are clipped\" --only extended-clipped\n  \
-aogauge golden approve reports/latest --renderer gpu --as radeon --reason \"its driver rounds otherwise\"")]
+aogauge golden approve reports/latest --renderer gpu --as radeon --reason \"its driver rounds otherwise\"\n  \
+aogauge golden approve reports/latest --reason \"larger views\" --dry-run --limit 20MB")]
 pub struct Args {
     /// The record's folder, or a zip file that holds one, as CI keeps it.
     record: PathBuf,
@@ -33,6 +34,13 @@ pub struct Args {
     /// separated by commas.
     #[arg(long, value_name = "LIMITS")]
     tolerance: Option<Limits>,
+    /// Refuse, with exit code 1, what makes all goldens hold more than this: bytes, or a
+    /// number with kB, MB, GB, KiB, MiB or GiB.
+    #[arg(long, value_name = "SIZE", value_parser = parse)]
+    limit: Option<u64>,
+    /// Only say what would be approved, and by how much the store would grow.
+    #[arg(long)]
+    dry_run: bool,
     /// The folder of goldens.
     #[arg(long, default_value = "goldens")]
     goldens: PathBuf,
@@ -67,14 +75,10 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
         },
         name: args.name.as_deref(),
         limits: args.tolerance,
+        most: args.limit,
+        dry_run: args.dry_run,
     };
-    let approved = store.approve(candidates.folder(), &record, &approval, &waiting).map_err(|e| match e {
-        ApproveError::Disk(e) => Failure::from(e),
-        lost @ ApproveError::Lost { .. } => {
-            let message = format!("{lost}. Run again, or select others with --only");
-            Failure { exit: Exit::Incomplete, message }
-        }
-    })?;
+    let approved = store.approve(candidates.folder(), &record, &approval, &notice).map_err(failure)?;
     if approved.files.is_empty() {
         return Err(nothing(&record, &args.only));
     }
@@ -83,13 +87,34 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     }
     let (before, after) = (approved.before, approved.after);
     let than = if after < before { "less" } else { "more" };
+    let [done, holds] = if args.dry_run { ["would be approved", "would hold"] } else { ["approved", "holds"] };
     tell(&format!(
-        "{} goldens approved: {}; the store holds {}, {} {than} than before",
+        "{} goldens {done}: {}; the store {holds} {}, {} {than} than before",
         approved.files.len(),
         args.reason,
         bytes(after),
         bytes(after.abs_diff(before))
     ));
-    warn_if_large(after, LARGE);
     Ok(Exit::Pass)
+}
+
+fn failure(e: ApproveError) -> Failure {
+    let exit = match &e {
+        ApproveError::Lost { .. } => Exit::Incomplete,
+        ApproveError::Pointer { .. } => Exit::Golden,
+        ApproveError::Large { .. } => Exit::Failed,
+        ApproveError::Disk(_) => Exit::Usage,
+    };
+    let message = match e {
+        ApproveError::Disk(e) => return e.into(),
+        ApproveError::Lost { .. } => format!("{e}. Run again, or select others with --only"),
+        ApproveError::Large { before, after, most } => format!(
+            "the store holds {} and would hold {}, more than {}; nothing is approved",
+            bytes(before),
+            bytes(after),
+            bytes(most)
+        ),
+        e @ ApproveError::Pointer { .. } => e.to_string(),
+    };
+    Failure { exit, message }
 }

@@ -1,7 +1,7 @@
 //! `aogauge golden list`
 
-use super::{Exit, Failure, Format, bytes, json, print, tell};
-use crate::golden::{Entry, Store, VERSION};
+use super::{Exit, Failure, Format, bytes, existing, json, pending, print, tell};
+use crate::golden::{Entry, VERSION};
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -28,31 +28,36 @@ pub struct Listing {
     version: u32,
     /// The goldens, in order.
     goldens: Vec<Entry>,
+    /// Whether a change was cut short and counts as made.
+    interrupted: bool,
 }
 
 pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
-    let mut entries = Store::new(&args.goldens).entries()?;
+    let store = existing(&args.goldens)?;
+    let mut entries = store.entries()?;
+    let interrupted = store.is_interrupted()?;
     entries.retain(|e| e.slot.path().to_string_lossy().replace('\\', "/").contains(&args.only));
     if entries.is_empty() {
         let message = format!("{} holds no golden that contains '{}'", args.goldens.display(), args.only);
         return Err(Failure { exit: Exit::Nothing, message });
     }
-    let broken = entries.iter().filter(|e| e.golden.is_err()).count();
+    let broken = entries.iter().filter(|e| e.unreadable.is_some()).count();
     let total: u64 = entries.iter().map(|e| e.bytes).sum();
     let said = format!("{} goldens, {}; {broken} cannot be read", entries.len(), bytes(total));
     match args.format {
         Format::Text => print(&table(&entries))?,
-        Format::Json => print(&json(&Listing { version: VERSION, goldens: entries })?)?,
+        Format::Json => print(&json(&Listing { version: VERSION, goldens: entries, interrupted })?)?,
     }
     tell(&said);
+    pending(interrupted);
     Ok(if broken > 0 { Exit::Golden } else { Exit::Pass })
 }
 
 fn table(entries: &[Entry]) -> String {
     let row = |e: &Entry| {
         let rest = match &e.golden {
-            Err(why) => format!("UNREADABLE  {why}"),
-            Ok(about) => {
+            None => format!("UNREADABLE  {}", e.unreadable.as_deref().unwrap_or_default()),
+            Some(about) => {
                 let (of, from) = (&about.identity, &about.provenance);
                 let [width, height] = of.resolution;
                 let tolerance = about.tolerance.as_ref().map_or_else(String::new, |t| format!("  tolerance {t}"));

@@ -10,10 +10,11 @@ mod verify;
 
 use super::{Exit, Failure, Format, json, print, tell};
 use crate::{
-    golden::{Outcome, Verification},
+    golden::{Notice, Outcome, Store, Verification},
     record::Record,
 };
 use clap::Subcommand;
+use std::path::Path;
 
 pub(super) use list::Listing;
 pub(super) use size::Sizes;
@@ -53,9 +54,35 @@ fn nothing(record: &Record, only: &str) -> Failure {
     Failure { exit: Exit::Nothing, message }
 }
 
-/// Says that another change of the store is waited for.
-fn waiting() {
-    tell("aogauge: another command reads or changes the goldens; waiting for it to end");
+/// Says what happens before a store is changed.
+fn notice(notice: Notice) {
+    match notice {
+        Notice::Waiting => tell("aogauge: another command reads or changes the goldens; waiting for it to end"),
+        Notice::Finished { written, removed } => tell(&format!(
+            "aogauge: a change of the goldens had been decided and interrupted; it is finished now: {written} goldens \
+             put in place, {removed} removed. `git status` shows which"
+        )),
+        Notice::Size { after, .. } => warn_if_large(after, LARGE),
+    }
+}
+
+/// Says that the files in the store are not what the verb shows.
+fn pending(interrupted: bool) {
+    if interrupted {
+        tell(
+            "aogauge: a change of the goldens was decided and then interrupted. It counts as made here, but some files \
+             still are the old ones, and git sees a mixture: commit nothing before the next approve, prune or remove \
+             has finished it; then check with `git status`",
+        );
+    }
+}
+
+/// The store in a folder that is there: a mistyped one holds no golden either.
+fn existing(folder: &Path) -> Result<Store, Failure> {
+    if folder.is_dir() {
+        return Ok(Store::new(folder));
+    }
+    Err(Failure { exit: Exit::Golden, message: format!("there is no folder of goldens {}", folder.display()) })
 }
 
 /// Says what a large store costs.

@@ -1,6 +1,6 @@
 //! `aogauge golden prune`
 
-use super::{Exit, Failure, print, tell, waiting};
+use super::{Exit, Failure, notice, pending, print, tell};
 use crate::{
     golden::{Candidates, Slot, Store, named_by_record, named_by_suite},
     record::Record,
@@ -33,9 +33,12 @@ pub struct Args {
 pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     let named = named(&args.named_by)?;
     let store = Store::new(&args.goldens);
-    let orphans = if args.dry_run { store.orphans(&named)? } else { store.prune(&named, &waiting)? };
+    let orphans = if args.dry_run { store.orphans(&named)? } else { store.prune(&named, &notice)? };
     for slot in &orphans {
         print(&format!("{}\n", store.path(slot).display()))?;
+    }
+    if args.dry_run {
+        pending(store.is_interrupted()?);
     }
     let done = if args.dry_run { "would be removed" } else { "removed" };
     tell(&format!("{} goldens {done}; {} cases are named", orphans.len(), named.len()));

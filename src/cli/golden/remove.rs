@@ -1,6 +1,6 @@
 //! `aogauge golden remove`
 
-use super::{Exit, Failure, print, tell, waiting};
+use super::{Exit, Failure, notice, print, tell};
 use crate::golden::{Slot, Store};
 use std::{
     collections::BTreeSet,
@@ -28,7 +28,7 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     let store = Store::new(&args.goldens);
     let slots: BTreeSet<Slot> =
         args.names.iter().map(|name| slot(name, &args.goldens)).collect::<Result<_, Failure>>()?;
-    let missing = store.remove(&slots, &waiting)?;
+    let missing = store.remove(&slots, &notice)?;
     if let Some(first) = missing.first() {
         let message = format!(
             "{} of {} goldens do not exist, the first is {}; nothing is removed",

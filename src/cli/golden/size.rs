@@ -1,7 +1,7 @@
 //! `aogauge golden size`
 
-use super::{Exit, Failure, Format, LARGE, bytes, json, print, warn_if_large};
-use crate::golden::{Store, VERSION};
+use super::{Exit, Failure, Format, LARGE, bytes, existing, json, pending, print, warn_if_large};
+use crate::golden::VERSION;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::{collections::BTreeMap, path::PathBuf};
@@ -32,11 +32,15 @@ pub struct Sizes {
     limit: Option<u64>,
     /// Bytes of each scene's goldens.
     scenes: BTreeMap<String, u64>,
+    /// Whether a change was cut short and counts as made.
+    interrupted: bool,
 }
 
 pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
-    let scenes = Store::new(&args.goldens).sizes()?;
-    let sizes = Sizes { version: VERSION, total: scenes.values().sum(), limit: args.limit, scenes };
+    let store = existing(&args.goldens)?;
+    let scenes = store.sizes()?;
+    let interrupted = store.is_interrupted()?;
+    let sizes = Sizes { version: VERSION, total: scenes.values().sum(), limit: args.limit, scenes, interrupted };
     match args.format {
         Format::Json => print(&json(&sizes)?)?,
         Format::Text => {
@@ -46,12 +50,13 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
             print(&format!("{:>10}  all\n", bytes(sizes.total)))?;
         }
     }
+    pending(interrupted);
     warn_if_large(sizes.total, args.limit.unwrap_or(LARGE));
     let above = args.limit.is_some_and(|limit| sizes.total > limit);
     Ok(if above { Exit::Failed } else { Exit::Pass })
 }
 
-fn parse(text: &str) -> Result<u64, String> {
+pub(super) fn parse(text: &str) -> Result<u64, String> {
     let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
     let (number, unit) = text.split_at(digits);
     let factor = match unit.trim() {

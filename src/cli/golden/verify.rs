@@ -1,8 +1,8 @@
 //! `aogauge golden verify`
 
-use super::{Exit, Failure, Format, exit, json, nothing, print, tell};
+use super::{Exit, Failure, Format, exit, json, nothing, pending, print, tell};
 use crate::{
-    golden::{ALPHA, Candidates, Outcome, Store},
+    golden::{ALPHA, Candidates, Checked, Outcome, Stale, Store},
     record::Record,
 };
 use std::path::PathBuf;
@@ -34,22 +34,20 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     if found.cases.is_empty() {
         return Err(nothing(&record, &args.only));
     }
-    if args.format == Format::Json {
-        print(&json(&found)?)?;
-    }
-    for case in &found.cases {
-        tell(&case.line());
-    }
+    let mut lines: Vec<String> = found.cases.iter().map(Checked::line).collect();
     let [pass, fail, blind, missing, lost] =
         [Outcome::Pass, Outcome::Fail, Outcome::Blind, Outcome::Missing, Outcome::Lost].map(|o| found.count(o));
-    tell(&format!(
+    lines.push(format!(
         "{pass} hold, {fail} differ, {blind} too noisy to tell, {missing} missing or unusable, {lost} lost; family error {ALPHA}"
     ));
-    if let Some(stale) = &found.stale {
-        tell(&stale.line());
+    lines.extend(found.stale.as_ref().map(Stale::line));
+    match args.format {
+        Format::Text => print(&(lines.join("\n") + "\n"))?,
+        Format::Json => {
+            print(&json(&found)?)?;
+            lines.iter().for_each(|line| tell(line));
+        }
     }
-    if found.interrupted {
-        tell("an approval was cut short after it was decided and counts as made; the next approval finishes it");
-    }
+    pending(found.interrupted);
     Ok(exit(&found))
 }
