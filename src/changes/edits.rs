@@ -36,7 +36,7 @@ fn options(gate: &Gate) -> [(&'static str, String); 10] {
     [
         ("metric", gate.metric.label().to_owned()),
         ("region", or_none(gate.region.as_ref(), |r| r.label().to_owned())),
-        ("warn", or_none(gate.warn.as_ref(), |w| w.text())),
+        ("warn", or_none(gate.warn.as_ref(), crate::gate::Limit::text)),
         ("against", or_none(gate.against.as_ref(), Clone::clone)),
         ("confidence", gate.confidence.to_string()),
         ("scenes", filter(&gate.scenes)),

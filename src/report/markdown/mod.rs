@@ -217,9 +217,9 @@ fn environment() -> Result<Environment<'static>, minijinja::Error> {
         }
         let text = value.to_string();
         if value.is_safe() {
-            out.write_str(&text)?
+            out.write_str(&text)?;
         } else {
-            out.write_str(&untrusted::markdown(&text))?
+            out.write_str(&untrusted::markdown(&text))?;
         }
         Ok(())
     });
