@@ -608,7 +608,8 @@ fn no_driver_is_no_error_unless_a_gpu_is_asked_for() {
     let (dir, suite) = folder(
         &scene(|s| s),
         &suite(
-            "[[gate]]\nname = \"same\"\nmetric = \"renderer-difference\"\nrenderers = [\"gpu\"]\nequals = 0.0\nwithin = 0.1",
+            "[[gate]]\nname = \"same\"\nmetric = \"renderer-difference\"\nrenderers = [\"gpu\"]\nequals = 0.0\nwithin = 0.1\n\
+             [[gate]]\nname = \"not black\"\nmetric = \"openness\"\nregion = \"all\"\nmin = 0.0",
         ),
     );
     let out = dir.path().join("out");

@@ -2,7 +2,7 @@
 //! says which extension the file has.
 #![no_main]
 
-use aogauge::picture::read::{EXTENSIONS, LayerChoice, decode, decode_samples, size};
+use aogauge::picture::read::{EXTENSIONS, LayerChoice, channels, check_whole, claim, decode, decode_samples, size};
 use libfuzzer_sys::fuzz_target;
 use std::path::PathBuf;
 
@@ -13,4 +13,7 @@ fuzz_target!(|bytes: &[u8]| {
         assert!(found.image.planes().iter().all(|p| p.len() == found.image.pixels()));
     }
     let _ = decode_samples(&path, bytes);
+    let (claimed, whole) = (claim(&path, bytes), check_whole(&path, bytes));
+    assert!(claimed.is_ok() || whole.is_err());
+    let _ = channels(&path, bytes, None);
 });

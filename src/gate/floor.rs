@@ -186,7 +186,7 @@ mod tests {
         let there = Estimate { value: 0.51, se: 0.01 / n.sqrt(), df: 15.0 * n };
         assert!((LIMIT.detectable(&there, 0.05).unwrap() - 0.01).abs() < 1e-9, "{n}");
         assert!(
-            text(&v).contains("more replicates would decide") && text(&v).contains("about 7.9 times"),
+            text(&v).contains("more replicates would decide") && text(&v).contains("about 8.0 times"),
             "{}",
             text(&v)
         );

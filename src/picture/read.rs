@@ -210,7 +210,10 @@ pub fn claim(path: &Path, bytes: &[u8]) -> Result<Claim, DiskError> {
 /// # Errors
 /// As [`read`].
 pub fn check_whole(path: &Path, bytes: &[u8]) -> Result<[usize; 2], DiskError> {
-    if !is_exr(path, bytes) && reader(path, bytes)?.format() == Some(ImageFormat::Png) {
+    if is_exr(path, bytes) {
+        return read_exr::stored(path, bytes, None).and_then(|_| exr_size(path, bytes));
+    }
+    if reader(path, bytes)?.format() == Some(ImageFormat::Png) {
         return read_png::check_whole(path, bytes);
     }
     decode_samples(path, bytes).map(|samples| samples.size)
