@@ -152,8 +152,8 @@ fn a_run_is_held_against_a_base_and_explains_itself() {
 fn divided(dir: &Path, suite: &Path, base: &Path, whole: &Record) {
     let [parts, merged, some] = ["parts", "merged", "some"].map(|n| dir.join(n));
     let base = base.to_str().unwrap();
-    let (code, text) = run(suite, &parts, &["--shard", "1/2", "--base", base]);
-    assert!(code == 2 && text.contains("--base") && !parts.exists(), "{text}");
+    let (code, text) = run(suite, &dir.join("odd"), &["--shard", "1/2", "--base", base]);
+    assert!(code == 0 && text.contains("--base is of no use to a shard without --until-sure"), "{text}");
     for shard in ["1/2", "2/2"] {
         let (code, text) = run(suite, &parts.join(&shard[..1]), &["--seed", "2", "--shard", shard]);
         assert_eq!(code, 0, "{text}");
@@ -295,7 +295,7 @@ fn the_noise_of_a_base_is_not_promised_away() {
     let [suite, base, now] = ["s.toml", "base", "now"].map(|n| dir.path().join(n));
     let head =
         SUITE.split("[[gate]]").next().unwrap().replace("replicates = 4\nconverged", "replicates = 8\nconverged");
-    let gate = "[[gate]]\nname = \"g\"\nmetric = \"contrast-error\"\nagainst = \"base\"\nmax = 0.02\n";
+    let gate = "[[gate]]\nname = \"g\"\nmetric = \"contrast-error\"\nagainst = \"base\"\nmax = 0.03\n";
     fs::write(&suite, format!("{head}{gate}")).unwrap();
     assert_eq!(run(&suite, &base, &["--no-base"]).0, 0);
     let more = format!("{head}{gate}").replace("replicates = 8\nconverged", "replicates = 128\nconverged");

@@ -188,7 +188,7 @@ fn the_formats_and_the_exit_code_agree() {
     for (record, code, end) in [
         (stored(), 0, End::Pass),
         (only(Outcome::Warn), 0, End::Pass),
-        (idle(true), 0, End::Pass),
+        (idle(true), 4, End::Nothing),
         (only(Outcome::Fail), 1, End::Fail),
         (mixed(), 1, End::Fail),
         (only(Outcome::Inconclusive), 6, End::Inconclusive),
