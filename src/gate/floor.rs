@@ -105,11 +105,13 @@ impl Verdict {
     }
 
     /// Whether what the case's replicates have no part in is enough to keep the verdict
-    /// open, if the value stays where it is: then no number of them decides. Not where even a
-    /// thousandth of its variance would, for there the value lies on the limit.
+    /// open, if the value stays where it is: then no number of them decides. Not where a
+    /// thousandth of a smaller part of the variance would too, for there the value lies on the limit.
     pub fn is_kept_by_floor(&self, family: usize) -> bool {
-        let times = self.out_of_sight(f64::INFINITY, family).map(|ratio| ratio * ratio);
-        self.floor.is_some() && times.is_some_and(|times| times > 1.0 && times < MOST)
+        let (Some(floor), Some(se)) = (self.floor, self.se()) else { return false };
+        let is_most = 2.0 * floor.se.powi(2) >= se.powi(2);
+        let ratio = self.out_of_sight(f64::INFINITY, family);
+        ratio.is_some_and(|ratio| ratio > 1.0 && (is_most || ratio * ratio < MOST))
     }
 
     /// Whether more replicates of the case may still decide: by what the rest of the standard error

@@ -331,8 +331,7 @@ fn a_metric_is_held_against_the_base_record() {
     // Without one they are undecided, unless there is none on purpose.
     let (verdicts, idle) = judged(vec![against.clone()], &now, None);
     assert!(verdicts.is_empty() && !idle[0].excused && idle[0].reason.contains("give --base DIR, or --no-base"));
-    let suite_of = suite(vec![against.clone()]);
-    let alone = record(suite_of.clone(), vec![scene("s")], now.to_vec());
+    let alone = record(suite(vec![against.clone()]), vec![scene("s")], now.to_vec());
     let none = Evidence { no_base: true, ..Evidence::from(&alone) };
     let (verdicts, idle) = judge(&none);
     assert!(verdicts.is_empty() && idle[0].excused && idle[0].reason.contains("(--no-base)"));
@@ -464,7 +463,7 @@ fn verdicts_explain_themselves() {
         &["a truth 0.030 from the limit is decided in 80 % of runs", "So it fails: the limit is broken", "undo it"],
     );
     says(&v, &["See pictures/s/profile.svg."]);
-    // d = .030 at a margin of .01: nine times the replicates.
+    // d = .030 at a margin of .01: nine times the replicates, or fewer, for they bring degrees of freedom.
     let v = one(gate(Limit::AtLeast(0.5)), 0.51, 0.01);
     says(&v, &["So it is inconclusive", "about 8.0 times the replicates decide"]);
     says(&one(gate(Limit::AtLeast(0.5)), 0.5, 0.01), &["replicates will not decide"]);
