@@ -11,11 +11,11 @@ pub struct UntilSure {
     pub max_replicates: u32,
     /// After so many seconds none were added; null without end.
     pub max_time: Option<f64>,
-    /// What a budget ended before all its verdicts and warnings were decided.
+    /// What a budget, or that more replicates would not help, ended before all its verdicts and warnings were decided.
     pub undecided: Vec<Undecided>,
 }
 
-/// Cases that grow together, and were ended by a budget.
+/// Cases that grow together, and were ended before all was decided.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Undecided {
@@ -37,4 +37,7 @@ pub enum Budget {
     MaxTime,
     /// `--max-replicates`.
     MaxReplicates,
+    /// That no number of replicates would decide: what is left is the noise of the judge, of the
+    /// converged image or of a base record.
+    Floor,
 }

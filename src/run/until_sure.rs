@@ -2,7 +2,8 @@
 //!
 //! The cases of one scene and ray count make a block: they are compared with each other,
 //! so they keep in step. A block begins with 4 replicates and doubles them until each of its
-//! verdicts is decided, and whether it warns, or a budget ends. Each look spends its share of the error
+//! verdicts is decided, and whether it warns, or a budget ends, or no number of them would
+//! help. Each look spends its share of the error
 //! ([`spending`](crate::stats::spending)), and is corrected by Bonferroni over all the verdicts that the plan
 //! can come to ([`decided`](crate::stats::decided)): so what ends a block depends on nothing outside
 //! its scene, on one machine or on many, and stands when Holm's correction is made over
@@ -119,7 +120,10 @@ impl Studio<'_> {
                 counts.set(case, n, look);
             }
             let verdicts = self.verdicts(sight, rendered, &counts);
-            open = self.undecided(&verdicts, sight.family).into_iter().filter(|b| open.contains(b)).collect();
+            let (undecided, kept) = self.undecided(&verdicts, sight.family);
+            let closed = open.difference(&undecided).filter(|b| kept.contains(*b));
+            counts.undecided.extend(closed.map(|b| end(*b, n, Budget::Floor)));
+            open = open.intersection(&undecided).copied().collect();
             if let Some(why) = self.red(sight, &verdicts).filter(|_| self.means.fail_fast) {
                 rendered.ended.get_or_insert(why);
                 self.means.stop.ask();
@@ -164,18 +168,21 @@ impl Studio<'_> {
         judge(&evidence).0
     }
 
-    /// The blocks with a verdict, or a warning, that more replicates may decide.
-    fn undecided(&self, verdicts: &[Verdict], family: usize) -> BTreeSet<u32> {
-        let open = verdicts.iter().filter_map(|v| {
+    /// The blocks with a verdict, or a warning, that more replicates may decide, and those with
+    /// one that no number of them does.
+    fn undecided(&self, verdicts: &[Verdict], family: usize) -> (BTreeSet<u32>, BTreeSet<u32>) {
+        let unsure = verdicts.iter().filter_map(|v| {
             let case = v.case.as_ref()?;
             let p = [v.p_holds?.raw, v.p_broken?.raw];
             let alpha = 1.0 - v.confidence;
             let is_broken = decided([p[1], f64::NAN], family, v.spent, alpha);
             let warns = |p: [f64; 2]| decided(p, family, v.spent, alpha);
             let sure = is_broken || decided(p, family, v.spent, alpha) && warning(v).is_none_or(warns);
-            Some(block(self.set.plan, case)).filter(|_| !sure && v.can_be_decided(family))
+            Some((block(self.set.plan, case), v.can_be_decided(family))).filter(|_| !sure)
         });
-        open.collect()
+        let (open, kept): (Vec<_>, Vec<_>) = unsure.partition(|(_, can_be_decided)| *can_be_decided);
+        let blocks = |of: Vec<(u32, bool)>| of.into_iter().map(|(block, _)| block).collect();
+        (blocks(open), blocks(kept))
     }
 
     /// A gate that is surely red, whatever the other verdicts of the plan come to: as for
