@@ -48,7 +48,10 @@ case $ARGS in
     *) read -r -a args <<< "$ARGS" ;;
 esac
 
+# Where a base was asked for and is not there, gates against it are left out on purpose.
+no_base=
 if [ -n "$BASE" ]; then
+    no_base=--no-base
     if [ ! -f "$BASE/record.json" ]; then
         echo "::notice title=aogauge::there is no record in $BASE: nothing is compared"
         BASE=
@@ -56,6 +59,8 @@ if [ -n "$BASE" ]; then
         # As after a new version of aogauge; no fault of the change.
         echo "::warning title=aogauge::the record in $BASE cannot be read: nothing is compared"
         BASE=
+    else
+        no_base=
     fi
 fi
 
@@ -67,6 +72,7 @@ else
     [ -z "$SHARD" ] || command+=("--shard=$SHARD")
 fi
 [ -z "$BASE" ] || [ -n "$SHARD" ] || command+=("--base=$BASE")
+[ -z "$no_base" ] || command+=("$no_base")
 command+=(${args[@]+"${args[@]}"} -- "${MERGE:-$SUITE}")
 code=0
 "${command[@]}" || code=$?
