@@ -87,7 +87,8 @@ impl<'a> SceneImages<'a> {
                 label: "against Q, what the occluder does to the light".into(),
                 names: [name.clone(), "Q".into()],
                 limit: error_maps::LIMIT_Q,
-                note: "Red under the occluder is a false highlight. Flanks may differ by much: Q holds the direction of light.",
+                note: "Red under the occluder is a false highlight. Flanks may differ by much: Q holds the direction of light. A checker \
+                       is a pixel where Q is too noisy to show.",
             };
             pairs.push(self.measure(&terms, &own, &q, planes));
         }

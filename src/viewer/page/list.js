@@ -89,6 +89,14 @@ function fillFilters() {
   form.addEventListener("submit", (event) => event.preventDefault());
 }
 
+/** Scrolls the list, and not the page, to where a row is seen. */
+function reveal(button) {
+  const list = byId("list");
+  const [outer, own] = [list.getBoundingClientRect(), button.getBoundingClientRect()];
+  if (own.top < outer.top) list.scrollTop -= outer.top - own.top;
+  else if (own.bottom > outer.bottom) list.scrollTop += own.bottom - outer.bottom;
+}
+
 /** Shows an item; `focus` where somebody asked for it. */
 function choose(item, focus) {
   stage.show(item, decisionOf(item));
@@ -96,7 +104,7 @@ function choose(item, focus) {
   for (const button of document.querySelectorAll("#list .row")) button.removeAttribute("aria-current");
   const button = document.querySelectorAll("#list .row")[shownItems.indexOf(item)];
   button?.setAttribute("aria-current", "true");
-  button?.scrollIntoView({ block: "nearest" });
+  if (button) reveal(button);
   if (focus && window.matchMedia("(max-width: 900px)").matches) byId("stage").scrollIntoView();
 }
 
