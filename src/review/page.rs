@@ -36,7 +36,6 @@ pub(super) fn html(review: &Review, token: &str) -> Result<String, ReportError> 
     let store = review.store.folder().display().to_string();
     let page = Page {
         title: format!("Goldens of {}", record.suite.name),
-        headline: String::new(),
         outcome: match (lost, fail + missing, blind) {
             (1.., ..) => "error",
             (_, 1.., _) => "fail",

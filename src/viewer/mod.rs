@@ -21,11 +21,9 @@ use serde::Serialize;
 pub struct Page {
     /// The name of it all.
     pub title: String,
-    /// What it came to, in a few words.
-    pub headline: String,
-    /// The same as a class: see [`Item::outcome`].
+    /// What it came to: see [`Item::outcome`].
     pub outcome: &'static str,
-    /// One sentence under the headline.
+    /// One sentence under the title.
     pub summary: String,
     /// What must be known before anything is read: an incomplete run, a filter.
     pub notes: Vec<String>,

@@ -51,7 +51,6 @@ fn page(folder: &Path, record: &Record) -> Result<String, ReportError> {
     items.sort_by_key(|item| rows::rank(item.outcome));
     let page = Page {
         title: record.suite.name.clone(),
-        headline: record.suite.description.clone(),
         outcome: rows::overall(record),
         summary: format!("{} in {} cases. {}", record.summary_line(), record.summary.cases, record.suite.description),
         notes: rows::notes(record),
