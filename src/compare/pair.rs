@@ -180,13 +180,8 @@ impl Files<'_> {
         let weights = weights.as_deref();
         let found = exact(&ours, &theirs, region, weights, settings.tolerance)?;
         let report = judged(Exact { identical_files: bytes.same, ..found });
-        if settings.draw_exact {
-            let [reference, test] = [Stored::Samples(&ours), Stored::Samples(&theirs)];
-            let part = region.crop.unwrap_or(Rect::whole(ours.size));
-            let difference = Difference { reference, test, part, weights, tolerance: settings.tolerance };
-            keep(&report, &Drawn { difference, measured: None })?;
-        }
-        Ok(report)
+        let stored = [Stored::Samples(&ours), Stored::Samples(&theirs)];
+        drawn(report, stored, ours.size, weights, settings, keep)
     }
 
     /// The same of OpenEXR: all channels of all parts together, unless layers are asked
@@ -224,13 +219,7 @@ impl Files<'_> {
             let layer = Some(layer.to_owned()).filter(|l| !l.is_empty());
             let found = Exact { identical_files: bytes.same, ..found };
             let report = PairReport::judged(self.name, layer, found, None, None, &settings.limits);
-            if settings.draw_exact {
-                let [reference, test] = [Stored::Channels(ours), Stored::Channels(theirs)];
-                let part = region.crop.unwrap_or(Rect::whole(size));
-                let difference = Difference { reference, test, part, weights, tolerance };
-                keep(&report, &Drawn { difference, measured: None })?;
-            }
-            Ok(report)
+            drawn(report, [Stored::Channels(ours), Stored::Channels(theirs)], size, weights, settings, keep)
         })
     }
 
@@ -351,6 +340,23 @@ impl Files<'_> {
         };
         Ok(replicates(self.test, test)?.map(|test| [reference, test]))
     }
+}
+
+/// Hands the difference of stored numbers over to be drawn, where that is wanted.
+fn drawn(
+    report: PairReport,
+    [reference, test]: [Stored<'_>; 2],
+    size: [usize; 2],
+    weights: Option<&[f32]>,
+    settings: &Settings,
+    keep: &mut Keep<'_>,
+) -> Result<PairReport, CompareError> {
+    if settings.draw_exact {
+        let part = settings.region.crop.unwrap_or(Rect::whole(size));
+        let difference = Difference { reference, test, part, weights, tolerance: settings.tolerance };
+        keep(&report, &Drawn { difference, measured: None })?;
+    }
+    Ok(report)
 }
 
 /// What of a file is taken, of the reference (0) or the test image (1).
