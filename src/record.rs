@@ -486,6 +486,12 @@ impl Record {
         Ok(())
     }
 
+    /// Milliseconds that one replicate of a case took; None where that is not known.
+    pub fn milliseconds(&self, case: &CaseRecord) -> Option<f64> {
+        let seconds = self.timing.cases.get(&case.case.id())?;
+        Some(seconds * 1e3 / f64::from(self.replicates(case).max(1)))
+    }
+
     /// Replicates in the image of a case.
     pub fn replicates(&self, case: &CaseRecord) -> u32 {
         case.replicates.unwrap_or(self.suite.replicates)

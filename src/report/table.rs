@@ -75,7 +75,7 @@ pub fn detectable_text(detectable: Option<f64>) -> String {
 }
 
 /// How far inside its limit a verdict's value lies; negative outside.
-fn margin(verdict: &Verdict) -> f64 {
+pub(super) fn margin(verdict: &Verdict) -> f64 {
     verdict.value().map_or(f64::NEG_INFINITY, |value| verdict.limit.margin(value))
 }
 

@@ -3,7 +3,7 @@
 use crate::{
     gate::{Outcome, Verdict},
     record::Record,
-    report::{errors, in_a_line},
+    report::{errors, in_a_line, table::margin},
     untrusted::{cut, line},
 };
 
@@ -115,7 +115,6 @@ fn gates(record: &Record, outcome: Outcome) -> Vec<(&str, Vec<&Verdict>)> {
 
 /// The case furthest beyond the limit, or nearest to it, stands for all.
 fn of_gate(level: Level, title: &str, of: &[&Verdict]) -> Annotation {
-    let margin = |v: &Verdict| v.value().map_or(f64::NEG_INFINITY, |value| v.limit.margin(value));
     let worst = of.iter().min_by(|a, b| margin(a).total_cmp(&margin(b)));
     let mut message = worst.map_or_else(String::new, |v| format!("{}: {}", v.subject(), in_a_line(v)));
     match of.len() {

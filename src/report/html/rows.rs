@@ -82,10 +82,7 @@ pub(super) fn item(record: &Record, case: &CaseRecord, pairs: Vec<Pair>) -> Item
         };
         [m.title(), value]
     });
-    let time = record.timing.cases.get(&of.id()).map(|s| {
-        let each = s * 1e3 / f64::from(record.replicates(case).max(1));
-        ["time of a replicate".to_owned(), format!("{each:.1} ms")]
-    });
+    let time = record.milliseconds(case).map(|ms| ["time of a replicate".to_owned(), format!("{ms:.1} ms")]);
     let replicates = ["replicates".to_owned(), record.replicates(case).to_string()];
     Item {
         id: of.id(),

@@ -3,6 +3,7 @@
 
 use super::{
     super::{
+        errors,
         gallery::Gallery,
         table::{detectable_text, digits, outcome_text, value_text},
     },
@@ -76,8 +77,6 @@ struct Row {
 
 impl Attention {
     pub(super) fn new(record: &Record, gallery: &Gallery) -> Result<Self, DiskError> {
-        let judges = record.scenes.iter().filter_map(|s| Some([format!("{} (judge)", s.name), s.judge_error.clone()?]));
-        let cases = record.cases.iter().filter_map(|c| Some([c.case.id(), c.error.clone()?]));
         let idle = record.idle_gates.iter().filter(|g| !g.excused).map(|g| [g.gate.clone(), g.reason.clone()]);
         let mut gates: Vec<(&str, Vec<&Verdict>)> = Vec::new();
         for v in record.verdicts.iter().filter(|v| needs_a_look(v.outcome)) {
@@ -95,7 +94,7 @@ impl Attention {
         let more = gates.len().saturating_sub(GATES);
         let sections = gates.iter().take(GATES).filter_map(|(_, v)| section(record, gallery, v).transpose());
         Ok(Attention {
-            errors: judges.chain(cases).collect(),
+            errors: errors(record).map(|(what, why)| [what, why.to_owned()]).collect(),
             idle: idle.collect(),
             gates: sections.collect::<Result<_, _>>()?,
             more,

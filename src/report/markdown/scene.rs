@@ -192,7 +192,6 @@ fn case_row(record: &Record, case: &CaseRecord, has_judge: bool) -> CaseRow {
     let get = |name, region| show(case.metric(name, region));
     let error_region = if has_judge { Region::Footprint } else { Region::All };
     let error = case.metric(MetricName::ContrastError, None);
-    let pixels = record.timing.cases.get(&case.case.id()).copied();
     CaseRow {
         case: short_id(case),
         openness: get(MetricName::Openness, Some(Region::All)),
@@ -206,8 +205,7 @@ fn case_row(record: &Record, case: &CaseRecord, has_judge: bool) -> CaseRow {
         bias: get(MetricName::Bias, Some(error_region)),
         rmse: get(MetricName::Rmse, Some(error_region)),
         over_darkening: get(MetricName::OverDarkening, None),
-        milliseconds: pixels
-            .map_or_else(|| "–".to_owned(), |s| format!("{:.1}", s * 1e3 / f64::from(record.replicates(case).max(1)))),
+        milliseconds: record.milliseconds(case).map_or_else(|| "–".to_owned(), |ms| format!("{ms:.1}")),
         replicates: record.replicates(case),
     }
 }

@@ -126,8 +126,7 @@ fn milliseconds(record: &Record, row: &Pooled, scenes: &[String]) -> Option<f64>
                 && case.renderer == row.renderer
                 && case.rays == row.rays
         })?;
-        let seconds = record.timing.cases.get(&case.case.id())?;
-        Some(seconds * 1e3 / f64::from(record.replicates(case).max(1)))
+        record.milliseconds(case)
     };
     let times: Vec<f64> = scenes.iter().filter_map(of).collect();
     (!times.is_empty()).then(|| times.iter().sum::<f64>() / times.len() as f64)
