@@ -136,7 +136,7 @@ impl Sampled {
     }
 
     /// As independent pixels.
-    pub(super) fn pixels(&self) -> IndependentPixels<'_> {
+    pub fn pixels(&self) -> IndependentPixels<'_> {
         IndependentPixels {
             mean: &self.mean,
             variance: &self.variance,

@@ -148,6 +148,18 @@ fn layer(layers: &Layers, image: &str, name: &str) -> Result<Vec<f32>, ReportErr
     layers.get(name).map(<[f32]>::to_vec).ok_or_else(missing)
 }
 
+/// Q, NaN where it is too noisy to show, and its relative standard error.
+fn masked_q(layers: &Layers, image: &str) -> Result<[Vec<f32>; 2], ReportError> {
+    let mut q = layer(layers, image, "q")?;
+    let se = layer(layers, image, "q-relative-se")?;
+    for (q, se) in q.iter_mut().zip(&se) {
+        if too_noisy(*se) {
+            *q = f32::NAN;
+        }
+    }
+    Ok([q, se])
+}
+
 /// The pictures and plots of one scene.
 fn draw_scene(folder: &Path, record: &Record, scene: &SceneRecord, gallery: &mut Gallery) -> Result<(), ReportError> {
     let read = |image: &str| Layers::read(&folder.join(image));
@@ -192,13 +204,7 @@ fn against_judge(
 ) -> Result<(), ReportError> {
     let Some(judge) = &scene.judge else { return Ok(()) };
     let layers = Layers::read(&folder.join(&judge.image))?;
-    let mut q = layer(&layers, &judge.image, "q")?;
-    let se = layer(&layers, &judge.image, "q-relative-se")?;
-    for (q, se) in q.iter_mut().zip(se) {
-        if too_noisy(se) {
-            *q = f32::NAN;
-        }
-    }
+    let [q, _] = masked_q(&layers, &judge.image)?;
     for (name, test) in shown {
         let pair = error_maps::Pair { test, reference: &q, image: &judge.image };
         let place = gallery.place(&pictures::of_estimator(&scene.name, MINUS_Q, name));

@@ -3,11 +3,10 @@
 use super::Review;
 use crate::{
     golden::{Checked, Golden, Outcome, Sampled, Verdict, sampled},
-    metrics::regions::Region,
     record::{CaseRecord, Record, SceneRecord},
     report::{ReportError, html::SceneImages},
-    stats::{ImageSample, IndependentPixels},
-    viewer::{self, Detail, Item, Named, Page, Pair, Planes, flip_map, p_values},
+    stats::pixel_p_values,
+    viewer::{self, Item, Page, Pair, Planes},
 };
 
 /// How far the scale of differences reaches.
@@ -21,11 +20,11 @@ pub(super) fn html(review: &Review, token: &str) -> Result<String, ReportError> 
     for (checked, case) in review.shown() {
         let Some(scene) = record.scenes.iter().find(|s| s.name == case.case.scene) else { continue };
         // Cases stand scene by scene, so each scene is read once.
-        let of_scene = match images.take() {
+        let mut of_scene = match images.take() {
             Some((own, read)) if own.name == scene.name => read,
             _ => SceneImages::read(&review.folder, record, scene)?,
         };
-        items.push(item(review, checked, case, &of_scene, &mut planes)?);
+        items.push(item(review, checked, case, &mut of_scene, &mut planes)?);
         images = Some((scene, of_scene));
     }
     let rank = |outcome| ["error", "fail", "warn", "inconclusive", "pass"].iter().position(|o| *o == outcome);
@@ -54,7 +53,7 @@ pub(super) fn html(review: &Review, token: &str) -> Result<String, ReportError> 
         facts: facts(record, &store),
         review: Some(viewer::Review { token: token.to_owned(), store }),
     };
-    Ok(page.html(&planes))
+    Ok(page.html(&planes)?)
 }
 
 fn facts(record: &Record, store: &str) -> Vec<[String; 2]> {
@@ -71,7 +70,7 @@ fn item(
     review: &Review,
     checked: &Checked,
     case: &CaseRecord,
-    of_scene: &SceneImages<'_>,
+    of_scene: &mut SceneImages<'_>,
     planes: &mut Planes,
 ) -> Result<Item, ReportError> {
     let of = &case.case;
@@ -120,46 +119,19 @@ fn item(
     })
 }
 
-/// Pixel by pixel; what pixels of one replicate have to do with each other does not matter
-/// to a test of one.
-fn pixels(image: &Sampled) -> IndependentPixels<'_> {
-    IndependentPixels {
-        mean: &image.mean,
-        variance: &image.variance,
-        replicates: image.replicates,
-        quantum: if image.rays > 0 { 1.0 / f64::from(image.rays) } else { 0.0 },
-    }
-}
-
-/// The image beside its golden.
+/// The image beside its golden. p-values are taken pixel by pixel: what pixels of one
+/// replicate have to do with each other does not matter to a test of one.
 fn pair(golden: &Golden, image: &Sampled, planes: &mut Planes) -> Pair {
     let size = image.resolution;
     let noisy = |s: &Sampled| s.replicates > 1;
-    let p = (noisy(image) && noisy(&golden.image)).then(|| {
-        let (test, reference) = (pixels(image), pixels(&golden.image));
-        p_values(image.mean.len(), |i| test.mean(&[i]), |i| reference.mean(&[i]))
-    });
-    let flip = flip_map(size, &golden.image.mean, &image.mean);
-    let bits = |region: Region, bit: f32, all: &mut [f32]| {
-        for &i in golden.regions.get(&region).into_iter().flatten() {
-            if let Some(v) = all.get_mut(i) {
-                *v += bit;
-            }
-        }
-    };
-    let mut regions = vec![0.0; image.mean.len()];
-    for (i, region) in [Region::Footprint, Region::Left, Region::Right, Region::Far].into_iter().enumerate() {
-        bits(region, f32::from(1u8 << i), &mut regions);
-    }
+    let p =
+        (noisy(image) && noisy(&golden.image)).then(|| pixel_p_values(size, &image.pixels(), &golden.image.pixels()));
+    let images = [("this image", image.mean.as_slice()), ("golden", golden.image.mean.as_slice())];
     Pair {
         label: "against its golden".into(),
-        test: Named { name: "this image".into(), plane: planes.add(size, &image.mean, Detail::Exact) },
-        reference: Named { name: "golden".into(), plane: planes.add(size, &golden.image.mean, Detail::Exact) },
-        flip: flip.map(|map| planes.add(size, &map, Detail::Rounded)),
-        p: p.map(|p| planes.add(size, &p, Detail::Rounded)),
-        limit: LIMIT,
-        regions: Some(planes.add(size, &regions, Detail::Exact)),
-        transect: Vec::new(),
+        p: p.map(|p| planes.add_p_values(size, &p)),
+        regions: Some(planes.add_regions(size, &golden.regions)),
         note: "Of 100 pixels that are alike, one has a p-value below 0.01 by chance.".into(),
+        ..Pair::new(planes, size, images, LIMIT)
     }
 }

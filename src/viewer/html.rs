@@ -3,6 +3,7 @@
 use super::{Page, Plane, Planes};
 use crate::picture::scale::{LEAST_P, Scale};
 use base64::{Engine, engine::general_purpose::STANDARD};
+use minijinja::{Environment, Value};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
@@ -57,7 +58,7 @@ struct Data<'a> {
     least_p: f64,
 }
 
-pub(super) fn page(page: &Page, planes: &Planes) -> String {
+pub(super) fn page(page: &Page, planes: &Planes) -> Result<String, minijinja::Error> {
     let data = Data {
         page,
         planes: planes.all(),
@@ -79,24 +80,18 @@ pub(super) fn page(page: &Page, planes: &Planes) -> String {
     for (i, plane) in planes.all().iter().enumerate() {
         let _ = writeln!(texts, "<script type=\"text/plain\" id=\"plane-{i}\">{}</script>", plane.text);
     }
-    let mut html = String::with_capacity(MARKUP.len() + STYLE.len() + script.len() + json.len() + texts.len() + 4096);
-    for part in MARKUP.split_inclusive("}}") {
-        let Some((before, name)) = part.strip_suffix("}}").and_then(|p| p.rsplit_once("{{")) else {
-            html += part;
-            continue;
-        };
-        html += before;
-        match name.trim() {
-            "title" => html += &escaped(&page.title),
-            "policy" => html += &policy,
-            "style" => html += STYLE,
-            "script" => html += &script,
-            "data" => html += &json,
-            "planes" => html += &texts,
-            _ => {}
-        }
-    }
-    html
+    let ready = Value::from_safe_string;
+    let mut environment = Environment::new();
+    // By its name everything but what is ready is escaped.
+    environment.add_template("page.html", MARKUP)?;
+    environment.get_template("page.html")?.render(minijinja::context! {
+        title => page.title.as_str(),
+        policy => ready(policy),
+        style => ready(STYLE.to_owned()),
+        script => ready(script),
+        data => ready(json),
+        planes => ready(texts),
+    })
 }
 
 /// All scripts as one function, so that nothing of it is seen from outside.
@@ -112,18 +107,4 @@ fn hash(text: &str) -> String {
 /// JSON that no markup can begin in.
 fn inert(json: &str) -> String {
     json.replace('<', "\\u003c").replace('\u{2028}', "\\u2028").replace('\u{2029}', "\\u2029")
-}
-
-fn escaped(text: &str) -> String {
-    let mut html = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => html += "&amp;",
-            '<' => html += "&lt;",
-            '>' => html += "&gt;",
-            '"' => html += "&quot;",
-            c => html.push(c),
-        }
-    }
-    html
 }

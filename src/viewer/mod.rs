@@ -11,7 +11,6 @@ mod html;
 mod map;
 mod plane;
 
-pub use map::{flip_map, p_values};
 pub use plane::{Detail, Plane, PlaneId, Planes};
 
 use serde::Serialize;
@@ -109,7 +108,7 @@ pub struct GateRow {
 }
 
 /// A test image and the reference that it is held against, of one size.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Pair {
     /// What is compared, as it stands in a list. Example: `measure view, against Q`.
     pub label: String,
@@ -132,7 +131,7 @@ pub struct Pair {
 }
 
 /// An image and what it is called.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Named {
     /// What it is.
     pub name: String,
@@ -184,7 +183,10 @@ pub struct Decision {
 
 impl Page {
     /// The page as one HTML file.
-    pub fn html(&self, planes: &Planes) -> String {
+    ///
+    /// # Errors
+    /// Where the built-in template fails.
+    pub fn html(&self, planes: &Planes) -> Result<String, minijinja::Error> {
         html::page(self, planes)
     }
 }

@@ -40,7 +40,7 @@ fn page(folder: &Path, record: &Record) -> Result<String, ReportError> {
     // By their places in the record, so that scenes are read one after the other.
     let mut order = BTreeMap::new();
     for scene in &record.scenes {
-        let images = SceneImages::read(folder, record, scene)?;
+        let mut images = SceneImages::read(folder, record, scene)?;
         for (place, case) in record.cases.iter().enumerate().filter(|(_, c)| c.case.scene == scene.name) {
             order.insert(place, rows::item(record, case, images.pairs(case, &mut planes)?));
         }
@@ -65,5 +65,5 @@ fn page(folder: &Path, record: &Record) -> Result<String, ReportError> {
         facts: rows::facts(record),
         review: None,
     };
-    Ok(page.html(&planes))
+    Ok(page.html(&planes)?)
 }

@@ -1,32 +1,29 @@
 //! What a case's image is held against on the page.
 
-use super::super::{ReportError, error_maps, layer};
+use super::super::{ReportError, error_maps, layer, masked_q};
 use crate::{
+    golden::regions,
     layers::Layers,
-    metrics::{judge::too_noisy, regions::Region},
     record::{CaseRecord, Record, SceneRecord},
-    stats::Estimate,
-    viewer::{Detail, Named, Pair, PlaneId, Planes, flip_map, p_values},
+    stats::{IndependentPixels, pixel_p_values},
+    viewer::{Pair, PlaneId, Planes},
 };
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path};
 
 /// How far the scale of differences between two methods reaches.
 const LIMIT_METHODS: f64 = 0.2;
 
-/// An image whose noise is known: mean and standard error a pixel.
+/// An image, with its noise where that is known.
 struct Measured {
     values: Vec<f32>,
-    /// Variance of the mean a pixel, and its degrees of freedom.
-    noise: Option<(Vec<f32>, f64)>,
+    /// Variance over replicates a pixel, and how many there are.
+    noise: Option<(Vec<f32>, u32)>,
 }
 
 impl Measured {
-    fn at(&self, pixel: usize) -> Estimate {
-        let (se, df) = match &self.noise {
-            Some((variance, df)) => (f64::from(variance[pixel]).sqrt(), *df),
-            None => (f64::NAN, 1.0),
-        };
-        Estimate { value: f64::from(self.values[pixel]), se, df }
+    fn sample(&self) -> Option<IndependentPixels<'_>> {
+        let (variance, replicates) = self.noise.as_ref()?;
+        Some(IndependentPixels { mean: &self.values, variance, replicates: *replicates, quantum: 0.0 })
     }
 }
 
@@ -39,6 +36,10 @@ pub(crate) struct SceneImages<'a> {
     look: Layers,
     /// Q, NaN where it is too noisy, and its relative standard error.
     q: Option<[Vec<f32>; 2]>,
+    /// Which regions a pixel of the measure view lies in; kept when it is first asked for.
+    regions: Option<PlaneId>,
+    /// Pairs from the look view by estimator, likewise: all cases of one have the same.
+    looked_at: BTreeMap<String, Option<Pair>>,
 }
 
 /// How a pair is read, and the images it is of.
@@ -57,19 +58,13 @@ impl<'a> SceneImages<'a> {
             Some(judge) => {
                 let layers = read(&judge.image)?;
                 fits(&judge.image, layers.resolution, scene.resolution)?;
-                let mut q = layer(&layers, &judge.image, "q")?;
-                let se = layer(&layers, &judge.image, "q-relative-se")?;
-                for (q, se) in q.iter_mut().zip(&se) {
-                    if too_noisy(*se) {
-                        *q = f32::NAN;
-                    }
-                }
-                Some([q, se])
+                Some(masked_q(&layers, &judge.image)?)
             }
         };
         let converged = read(&scene.image)?;
         fits(&scene.image, converged.resolution, scene.resolution)?;
-        Ok(SceneImages { folder, record, scene, converged, look: read(&scene.look)?, q })
+        let look = read(&scene.look)?;
+        Ok(SceneImages { folder, record, scene, converged, look, q, regions: None, looked_at: BTreeMap::new() })
     }
 
     /// Regions and converged images.
@@ -78,7 +73,7 @@ impl<'a> SceneImages<'a> {
     }
 
     /// The pairs of a case, that shown first being the first; none where it has no image.
-    pub(crate) fn pairs(&self, case: &CaseRecord, planes: &mut Planes) -> Result<Vec<Pair>, ReportError> {
+    pub(crate) fn pairs(&mut self, case: &CaseRecord, planes: &mut Planes) -> Result<Vec<Pair>, ReportError> {
         let Some(own) = self.mean(case)? else { return Ok(Vec::new()) };
         let mut pairs = Vec::new();
         let name = format!("{}, {} rays x {}", case.case.estimator, case.case.rays, self.record.replicates(case));
@@ -115,12 +110,17 @@ impl<'a> SceneImages<'a> {
             };
             pairs.push(self.measure(&terms, &own, &theirs, planes));
         }
-        pairs.extend(self.looked_at(&case.case.estimator, planes));
+        let estimator = &case.case.estimator;
+        if !self.looked_at.contains_key(estimator) {
+            let pair = self.look_at(estimator, planes);
+            self.looked_at.insert(estimator.clone(), pair);
+        }
+        pairs.extend(self.looked_at.get(estimator).cloned().flatten());
         Ok(pairs)
     }
 
     /// Q beside classic AO.
-    pub(crate) fn of_judge(&self, planes: &mut Planes) -> Vec<Pair> {
+    pub(crate) fn of_judge(&mut self, planes: &mut Planes) -> Vec<Pair> {
         let classic = &self.record.suite.classic;
         let (Some(q), Some(values)) = (self.judged(), self.converged.get(&format!("converged-{classic}"))) else {
             return Vec::new();
@@ -169,8 +169,7 @@ impl<'a> SceneImages<'a> {
         fits(image, layers.resolution, self.scene.resolution)?;
         let replicates = self.record.replicates(case);
         let variance = layer(&layers, image, "variance")?;
-        let of_mean = variance.iter().map(|v| v / replicates.max(1) as f32).collect();
-        let noise = (replicates > 1).then(|| (of_mean, f64::from(replicates - 1)));
+        let noise = (replicates > 1).then_some((variance, replicates));
         Ok(Some(Measured { values: layer(&layers, image, "mean")?, noise }))
     }
 
@@ -179,46 +178,33 @@ impl<'a> SceneImages<'a> {
     fn as_noisy_as(&self, case: &CaseRecord, own: &Measured, values: &[f32], rays: u32) -> Measured {
         let own_rays = f64::from(case.case.rays) * f64::from(self.record.replicates(case));
         let ratio = (own_rays / f64::from(rays.max(1))) as f32;
-        let noise = own.noise.as_ref().map(|(v, df)| (v.iter().map(|v| v * ratio).collect(), *df));
+        let noise = own.noise.as_ref().map(|(v, n)| (v.iter().map(|v| v * ratio).collect(), *n));
         Measured { values: values.to_vec(), noise }
     }
 
     fn judged(&self) -> Option<Measured> {
         let [q, se] = self.q.as_ref()?;
-        let variance = q.iter().zip(se).map(|(q, se)| (q * se).powi(2)).collect();
         let replicates = self.scene.judge.as_ref().map_or(2, |j| j.replicates.max(2));
-        Some(Measured { values: q.clone(), noise: Some((variance, f64::from(replicates - 1))) })
+        let variance = q.iter().zip(se).map(|(q, se)| (q * se).powi(2) * replicates as f32).collect();
+        Some(Measured { values: q.clone(), noise: Some((variance, replicates)) })
     }
 
-    fn measure(&self, terms: &Terms<'_>, test: &Measured, reference: &Measured, planes: &mut Planes) -> Pair {
+    fn measure(&mut self, terms: &Terms<'_>, test: &Measured, reference: &Measured, planes: &mut Planes) -> Pair {
         let resolution = self.scene.resolution;
-        let p = (test.noise.is_some() && reference.noise.is_some())
-            .then(|| p_values(test.values.len(), |i| test.at(i), |i| reference.at(i)));
-        let mut pair = pair(terms, resolution, [&test.values, &reference.values], planes);
-        pair.label = format!("measure view, {}", terms.label);
-        pair.p = p.map(|p| planes.add(resolution, &p, Detail::Rounded));
-        pair.regions = Some(self.regions(planes));
-        pair.transect.clone_from(&self.scene.transect);
-        pair
-    }
-
-    /// Which regions a pixel lies in, a bit each.
-    fn regions(&self, planes: &mut Planes) -> PlaneId {
-        let mut bits = vec![0u8; self.scene.resolution[0] as usize * self.scene.resolution[1] as usize];
-        let regions = [Region::Footprint, Region::Left, Region::Right, Region::Far];
-        for (i, region) in regions.into_iter().enumerate() {
-            let mask = self.converged.get(&format!("region-{}", region.label())).unwrap_or_default();
-            for (bits, inside) in bits.iter_mut().zip(mask) {
-                *bits |= u8::from(*inside > 0.0) << i;
-            }
+        let p = test.sample().zip(reference.sample()).map(|(t, r)| pixel_p_values(resolution, &t, &r));
+        let regions = *self.regions.get_or_insert_with(|| planes.add_regions(resolution, &regions(&self.converged)));
+        Pair {
+            label: format!("measure view, {}", terms.label),
+            p: p.map(|p| planes.add_p_values(resolution, &p)),
+            regions: Some(regions),
+            transect: self.scene.transect.clone(),
+            ..pair(terms, resolution, [&test.values, &reference.values], planes)
         }
-        let bits: Vec<f32> = bits.into_iter().map(f32::from).collect();
-        planes.add(self.scene.resolution, &bits, Detail::Exact)
     }
 
     /// The picture from the look view beside that of classic AO; classic itself beside
     /// the next method.
-    fn looked_at(&self, estimator: &str, planes: &mut Planes) -> Option<Pair> {
+    fn look_at(&self, estimator: &str, planes: &mut Planes) -> Option<Pair> {
         let suite = &self.record.suite;
         let other = match estimator == suite.classic {
             true => suite.estimators.iter().find(|e| *e != estimator)?,
@@ -237,19 +223,9 @@ impl<'a> SceneImages<'a> {
 }
 
 fn pair(terms: &Terms<'_>, resolution: [u32; 2], [test, reference]: [&[f32]; 2], planes: &mut Planes) -> Pair {
-    let flip = flip_map(resolution, reference, test);
-    let [test_name, reference_name] = terms.names.clone();
-    Pair {
-        label: terms.label.clone(),
-        test: Named { name: test_name, plane: planes.add(resolution, test, Detail::Exact) },
-        reference: Named { name: reference_name, plane: planes.add(resolution, reference, Detail::Exact) },
-        flip: flip.map(|map| planes.add(resolution, &map, Detail::Rounded)),
-        p: None,
-        limit: terms.limit,
-        regions: None,
-        transect: Vec::new(),
-        note: terms.note.to_owned(),
-    }
+    let images = [(terms.names[0].as_str(), test), (terms.names[1].as_str(), reference)];
+    let (label, note) = (terms.label.clone(), terms.note.to_owned());
+    Pair { label, note, ..Pair::new(planes, resolution, images, terms.limit) }
 }
 
 fn fits(image: &str, found: [u32; 2], wanted: [u32; 2]) -> Result<(), ReportError> {
