@@ -1,6 +1,6 @@
 //! The judge of one scene: traced until it is precise, written, recorded.
 
-use super::{RunError, occluders::JudgedOccluder, rendering::Rendered, set::Set};
+use super::{RunError, occluders::JudgedOccluder, rendering::Rendered, subject::Subject};
 use crate::{
     layers::Layers,
     metrics::{
@@ -56,7 +56,7 @@ impl Judged {
     }
 }
 
-impl Set<'_> {
+impl Subject<'_> {
     /// Judges the scene by the images of its judge, and writes Q. Absent where there is
     /// nothing to judge.
     pub(super) fn judge(
@@ -76,7 +76,7 @@ impl Set<'_> {
         };
         let judge = Judge { regions, image: QImage::new(pairs) };
         if !judge.regions.has_light() {
-            return Err(RunError::NoLight { scene: self.scene.name.clone() });
+            return Err(RunError::NoLight { scene: self.facts.name.clone() });
         }
         let precision = judge.regions.widest();
         let sure = precision <= settings.precision;
@@ -92,7 +92,7 @@ impl Set<'_> {
             wanted: settings.precision,
             image: self.write_judge(folder, &judge)?,
         };
-        let curve = profile::of_judge(pairs, self.view.resolution[0] as usize);
+        let curve = profile::of_judge(pairs, self.facts.resolution[0] as usize);
         let on_screen = match &self.on_screen {
             None => Err(Absent("the suite has no screen-space method".into())),
             Some(s) => JudgedRegions::new(pairs, &s.regions).and_then(|j| match j.widest() {
@@ -106,9 +106,9 @@ impl Set<'_> {
     }
 
     fn write_judge(&self, folder: &RecordFolder, judge: &Judge) -> Result<String, RunError> {
-        let image = format!("images/{}/judge.exr", self.scene.name);
+        let image = format!("images/{}/judge.exr", self.facts.name);
         let [with, without] = judge.image.irradiance.clone();
-        Layers::new(self.view.resolution)
+        Layers::new(self.facts.resolution)
             .with("q", judge.image.q.clone())
             .with("q-relative-se", judge.image.relative_se.clone())
             .with("irradiance-with", with)

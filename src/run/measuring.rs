@@ -8,7 +8,8 @@ use super::{
     occluders::Occluder,
     on_screen::is_on_screen,
     rendering::{Rendered, Truth},
-    set::{Set, measured},
+    set::measured,
+    subject::Subject,
 };
 use crate::{
     metrics::{Absent, artifact::Method as Measured, judge::JudgedRegions, regions::Regions},
@@ -56,7 +57,7 @@ impl Counts {
 /// What is said of a case that the run did not come to.
 pub(super) const NOT_RENDERED: &str = "the run ended before it was rendered";
 
-impl Set<'_> {
+impl Subject<'_> {
     /// What was found in the scene and its cases. Where the judge, a converged image or
     /// the pictures are missing, there is no scene, and its cases say so.
     pub(super) fn measure(
@@ -83,7 +84,7 @@ impl Set<'_> {
     /// Whether everything is there that cases are measured with.
     pub(super) fn is_ready(&self, rendered: &Rendered) -> bool {
         self.plan.methods().iter().all(|m| rendered.truths.contains_key(m))
-            && (self.twin.is_none() || rendered.judge.is_some())
+            && (!self.facts.has_occluder || rendered.judge.is_some())
     }
 
     /// The judge of the pixels that a method is measured on.
@@ -135,7 +136,7 @@ impl Set<'_> {
                 cpu,
                 judge: self.judge_of(index, judged),
                 image: judged.as_ref().map_err(Unjudged::absent).and_then(Judged::image),
-                occluder: self.scene.has_occluder(),
+                occluder: self.facts.has_occluder,
             };
             records.push(CaseRecord {
                 case: case.clone(),

@@ -195,12 +195,12 @@ impl Shards {
         let mut parts = Vec::new();
         for set in &prepared.sets {
             for unit in set.units() {
-                let id = unit.id(set.plan, &set.scene.name);
+                let id = unit.id(set.subject.plan, &set.scene.name);
                 let found = self.all.iter().find_map(|(from, s)| Some((from, s.units.iter().find(|d| d.unit == id)?)));
                 let Some((from, done)) = found else {
                     return Err(MergeError::Missing(format!("no shard has rendered {id}")));
                 };
-                parts.push(Part { from, file: journal::file(set.plan, &set.scene.name, &unit), done });
+                parts.push(Part { from, file: journal::file(set.subject.plan, &set.scene.name, &unit), done });
             }
         }
         Ok(parts)

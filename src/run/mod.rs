@@ -21,6 +21,7 @@ mod rendering;
 mod set;
 mod shard;
 mod stop;
+mod subject;
 mod tracing;
 mod unit;
 mod until_sure;
@@ -152,7 +153,7 @@ impl<'a> Prepared<'a> {
     pub fn identity(&self, machine: &Machine) -> String {
         let plan = self.plan;
         let gpu = plan.cases.iter().any(|c| c.renderer == "gpu").then_some(&machine.gpu);
-        let scenes: Vec<[&str; 2]> = self.sets.iter().map(|s| [s.scene.name.as_str(), &s.hash]).collect();
+        let scenes: Vec<[&str; 2]> = self.sets.iter().map(|s| [s.scene.name.as_str(), &s.subject.facts.hash]).collect();
         let cases: Vec<String> = plan.cases.iter().map(Case::id).collect();
         let all = serde_json::json!({
             "build": BUILD, "suite": plan.suite.name, "file": plan.suite.file, "scenes": scenes,
@@ -198,7 +199,7 @@ impl<'a> Prepared<'a> {
             let mut rendered = Rendered::default();
             let counts = studio.scene(&mut rendered)?;
             rendered.note(&set.scene.name, &mut timing);
-            let (scene, records) = set.measure(folder, &rendered, &counts)?;
+            let (scene, records) = set.subject.measure(folder, &rendered, &counts)?;
             scenes.extend(scene);
             cases.extend(records);
             ended = ended.or(rendered.ended.as_deref().map(at_first_failure));
@@ -276,13 +277,13 @@ fn at_first_failure(what: &str) -> String {
 /// decides must be together, and a shard takes whole scenes.
 fn mine<'a>(set: &Set<'a>, shard: Option<Shard>) -> Vec<Unit<'a>> {
     let name = &set.scene.name;
-    let key = |unit: &Unit<'a>| if set.plan.until_sure.is_some() { name.clone() } else { unit.id(set.plan, name) };
+    let key = |unit: &Unit<'a>| if set.subject.plan.until_sure.is_some() { name.clone() } else { unit.id(set.subject.plan, name) };
     let is_mine = |unit: &Unit<'a>| shard.is_none_or(|s| shard_of(&key(unit), s.of) == s.index - 1);
     set.units().into_iter().filter(is_mine).collect()
 }
 
 fn step(set: &Set<'_>, unit: &Unit<'_>) -> Step {
-    Step { unit: unit.id(set.plan, &set.scene.name), rays: unit.cost(set.plan, set.pixels()) }
+    Step { unit: unit.id(set.subject.plan, &set.scene.name), rays: unit.cost(set.subject.plan, set.pixels()) }
 }
 
 /// A clock that begins now.

@@ -3,7 +3,7 @@
 use super::{
     case_metrics,
     judging::{Judged, region_q},
-    on_screen::OnScreen,
+    on_screen::Shown,
 };
 use crate::{
     metrics::{
@@ -13,7 +13,6 @@ use crate::{
         regions::{OccluderRegions, Region, Regions},
     },
     record::{OccluderMetrics, OccluderRecord},
-    render::gbuffer::GBuffer,
     stats::Estimate,
 };
 
@@ -34,8 +33,8 @@ pub(super) struct JudgedOccluder {
 
 impl Occluder {
     /// All that were found in view.
-    pub fn all(found: Vec<OccluderRegions>, gbuffer: &GBuffer, screen: Option<&OnScreen>) -> Vec<Self> {
-        let mut visible = vec![false; gbuffer.surfaces.len()];
+    pub fn all(found: Vec<OccluderRegions>, pixels: usize, screen: Option<&Shown>) -> Vec<Self> {
+        let mut visible = vec![false; pixels];
         for &i in screen.map_or(&[][..], |s| s.regions.pixels(Region::All)) {
             visible[i as usize] = true;
         }

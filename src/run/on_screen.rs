@@ -16,9 +16,9 @@ use crate::{
     trace::Tracer,
 };
 
-/// The camera with what it shows.
-pub(super) struct OnScreen {
-    pub camera: View,
+/// What the camera of screen-space methods shows.
+#[derive(Clone, Debug)]
+pub(super) struct Shown {
     /// Those of the measure view, less the pixels whose points it does not show.
     pub regions: Regions,
     pub record: ScreenRecord,
@@ -29,15 +29,15 @@ pub(super) fn is_on_screen(method: &Method) -> bool {
     matches!(method.estimator, Estimator::ScreenSpace(_))
 }
 
-impl OnScreen {
-    /// None for a suite without such methods.
+impl Shown {
+    /// The camera with what it shows; None for a suite without such methods.
     pub fn new(
         plan: &Plan<'_>,
         scene: &Scene,
         tracer: &Tracer,
         gbuffer: &GBuffer,
         regions: &Regions,
-    ) -> Result<Option<Self>, RunError> {
+    ) -> Result<Option<(View, Self)>, RunError> {
         if !plan.suite.methods.iter().any(is_on_screen) {
             return Ok(None);
         }
@@ -50,6 +50,6 @@ impl OnScreen {
             resolution: camera.resolution,
             regions: Region::ALL.into_iter().map(|r| (r, regions.pixels(r).len())).collect(),
         };
-        Ok(Some(OnScreen { camera, regions, record }))
+        Ok(Some((camera, Shown { regions, record })))
     }
 }

@@ -6,7 +6,8 @@ use super::{
     judging::{Judged, Unjudged},
     measuring::Counts,
     rendering::Rendered,
-    set::{Set, measured},
+    set::measured,
+    subject::Subject,
 };
 use crate::{
     layers::Layers,
@@ -22,7 +23,7 @@ use crate::{
 };
 use std::collections::BTreeMap;
 
-impl Set<'_> {
+impl Subject<'_> {
     /// What is found of the scene, with its images, which are written.
     pub(super) fn scene_record(
         &self,
@@ -32,9 +33,9 @@ impl Set<'_> {
         counts: &Counts,
     ) -> Result<SceneRecord, RunError> {
         let methods = &self.plan.suite.methods;
-        let pixels = self.view.pixels();
-        let width = self.view.resolution[0];
-        let mut layers = Layers::new(self.view.resolution);
+        let pixels = self.facts.pixels();
+        let width = self.facts.resolution[0];
+        let mut layers = Layers::new(self.facts.resolution);
         for region in Region::ALL {
             layers = layers.with(&format!("region-{}", region.label()), self.regions.mask(region, pixels));
         }
@@ -77,20 +78,21 @@ impl Set<'_> {
             Err(Unjudged::Absent(Absent(why))) => (None, Some(why.clone()), None),
             Err(Unjudged::Failed(why)) => (None, None, Some(why.clone())),
         };
-        let radius = f64::from(self.scene.ao.radius);
+        let facts = self.facts.clone();
+        let name = &self.facts.name;
         SceneRecord {
-            name: self.scene.name.clone(),
-            description: self.scene.description.clone(),
-            control: self.scene.control,
-            hash: self.hash.clone(),
-            radius,
-            secondary_radius: f64::from(self.scene.ao.secondary_radius),
-            triangles: self.geometry.tracer.triangles().len(),
-            resolution: self.view.resolution,
-            transect: (0..self.view.resolution[0])
-                .map(|x| f64::from(self.scene.measure.transect_at(x)) / radius)
-                .collect(),
-            regions: Region::ALL.into_iter().map(|r| (r, self.regions.pixels(r).len())).collect(),
+            image: format!("images/{name}/regions.exr"),
+            look: look_image(name),
+            name: facts.name,
+            description: facts.description,
+            control: facts.control,
+            hash: facts.hash,
+            radius: facts.radius,
+            secondary_radius: facts.secondary_radius,
+            triangles: facts.triangles,
+            resolution: facts.resolution,
+            transect: facts.transect,
+            regions: self.counts().collect(),
             brighter,
             judge,
             screen: self.on_screen.as_ref().map(|s| s.record.clone()),
@@ -99,8 +101,6 @@ impl Set<'_> {
             occluders,
             convergence: Vec::new(),
             profiles: Vec::new(),
-            image: format!("images/{}/regions.exr", self.scene.name),
-            look: look_image(&self.scene.name),
         }
     }
 
@@ -123,7 +123,7 @@ impl Set<'_> {
             let levels: Vec<Level<'_>> = self.cases().filter(of_key).filter_map(level).collect();
             let regions = self.regions(index);
             for region in [Region::All, Region::Footprint] {
-                if levels.is_empty() || (region == Region::Footprint && !self.scene.has_occluder()) {
+                if levels.is_empty() || (region == Region::Footprint && !self.facts.has_occluder) {
                     continue;
                 }
                 let (levels, pixels) = (levels.clone(), regions.measurable(region));

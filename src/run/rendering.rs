@@ -145,7 +145,7 @@ impl Studio<'_> {
             if self.means.stop.is_asked() {
                 return;
             }
-            let id = unit.id(self.set.plan, &self.set.scene.name);
+            let id = unit.id(self.set.subject.plan, &self.set.scene.name);
             self.progress.begin(&id);
             let known = {
                 let guard = shared.lock().unwrap_or_else(PoisonError::into_inner);
@@ -182,7 +182,7 @@ impl Studio<'_> {
                     return;
                 }
             }
-            self.progress.end(unit.cost(self.set.plan, self.set.pixels()));
+            self.progress.end(unit.cost(self.set.subject.plan, self.set.pixels()));
         }
     }
 
@@ -207,7 +207,7 @@ impl Studio<'_> {
         open: &dyn Fn() -> Result<Box<dyn Loaded + 'l>, RenderError>,
     ) -> Result<Option<(Result<Product, String>, Done, Option<String>)>, DiskError> {
         let start = Instant::now();
-        let file = journal::file(self.set.plan, &self.set.scene.name, unit);
+        let file = journal::file(self.set.subject.plan, &self.set.scene.name, unit);
         let path = self.journal.folder.path().join(&file);
         let mut known = known;
         if let Some(done) = self.journal.find(id, &file) {
@@ -276,7 +276,7 @@ impl Studio<'_> {
         images.replicates.truncate(replicates as usize);
         images.hash = pixel_hash(&moments(&images.replicates, self.set.view.pixels()).0);
         let (unit, images) = (Unit::Case(case), images.clone());
-        let path = self.journal.folder.path().join(journal::file(self.set.plan, &self.set.scene.name, &unit));
+        let path = self.journal.folder.path().join(journal::file(self.set.subject.plan, &self.set.scene.name, &unit));
         self.layers(&unit, &Product::Case(images)).write(&path)?;
         for done in rendered.done.iter_mut().filter(|d| d.unit == case.id()) {
             done.sha256 = Some(journal::sha256(&path)?);
@@ -309,7 +309,7 @@ impl Studio<'_> {
                     ("estimator", case.estimator.clone()),
                     ("renderer", case.renderer.clone()),
                     ("rays", case.rays.to_string()),
-                    ("seed", self.set.plan.seed.to_string()),
+                    ("seed", self.set.subject.plan.seed.to_string()),
                 ];
                 layers.attributes.extend(attributes.map(|(name, text)| (name.to_owned(), text)));
                 layers

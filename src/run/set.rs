@@ -3,7 +3,8 @@
 use super::{
     MAX_GIB, RunError,
     occluders::Occluder,
-    on_screen::{OnScreen, is_on_screen},
+    on_screen::Shown,
+    subject::{Facts, Subject},
     unit::Unit,
 };
 use crate::{
@@ -20,24 +21,19 @@ use std::borrow::Cow;
 /// Paths a pixel that look for any light at all.
 const LIGHT_PATHS: u32 = 4;
 
-/// One scene made ready: geometry, twin, what the measure view sees.
+/// One scene made ready: what is measured, and all that it takes to render it.
 pub(super) struct Set<'a> {
-    pub(super) plan: &'a Plan<'a>,
+    pub(super) subject: Subject<'a>,
     /// Near the origin.
     pub(super) scene: Cow<'a, Scene>,
-    /// Of the scene as it was given.
-    pub(super) hash: String,
     pub(super) geometry: Geometry,
     /// The scene without its occluder, traced from the same points; None where
     /// there is nothing to judge.
     pub(super) twin: Option<Geometry>,
     pub(super) view: View,
     pub(super) gbuffer: GBuffer,
-    pub(super) regions: Regions,
-    /// One by one, where the view shows two or more.
-    pub(super) occluders: Vec<Occluder>,
-    /// For suites with methods of screen space.
-    pub(super) on_screen: Option<OnScreen>,
+    /// Where methods of screen space are computed.
+    pub(super) camera: Option<View>,
 }
 
 impl<'a> Set<'a> {
@@ -81,15 +77,11 @@ impl<'a> Set<'a> {
             }
             twin = Some(bare);
         }
-        let hash = given.hash();
-        let on_screen = OnScreen::new(plan, &scene, &geometry.tracer, &gbuffer, &regions)?;
-        let occluders = Occluder::all(each, &gbuffer, on_screen.as_ref());
-        Ok(Set { plan, scene, hash, geometry, twin, view, gbuffer, regions, occluders, on_screen })
-    }
-
-    pub(super) fn cases(&self) -> impl Iterator<Item = &'a Case> {
-        let (plan, name) = (self.plan, &self.scene.name);
-        plan.cases.iter().filter(move |c| c.scene == *name)
+        let facts = Facts::new(&scene, given.hash(), geometry.tracer.triangles().len());
+        let (camera, on_screen) = Shown::new(plan, &scene, &geometry.tracer, &gbuffer, &regions)?.unzip();
+        let occluders = Occluder::all(each, view.pixels(), on_screen.as_ref());
+        let subject = Subject { plan, facts, regions, occluders, on_screen };
+        Ok(Set { subject, scene, geometry, twin, view, gbuffer, camera })
     }
 
     /// Pixels of the measure view, and of the look view.
@@ -99,23 +91,8 @@ impl<'a> Set<'a> {
 
     /// What is rendered of the scene.
     pub(super) fn units(&self) -> Vec<Unit<'a>> {
-        let cases: Vec<&'a Case> = self.cases().collect();
-        Unit::of_scene(self.plan, &cases, self.twin.is_some())
-    }
-
-    pub(super) fn method(&self, case: &Case) -> usize {
-        self.plan.suite.methods.iter().position(|m| m.name == case.estimator).unwrap_or(0)
-    }
-
-    /// Where methods of screen space are computed.
-    pub(super) fn camera(&self) -> Option<&View> {
-        self.on_screen.as_ref().map(|s| &s.camera)
-    }
-
-    /// Where a method is measured, and what is measured beside it.
-    pub(super) fn regions(&self, method: usize) -> &Regions {
-        let shown = self.on_screen.as_ref().filter(|_| is_on_screen(&self.plan.suite.methods[method]));
-        shown.map_or(&self.regions, |s| &s.regions)
+        let cases: Vec<&'a Case> = self.subject.cases().collect();
+        Unit::of_scene(self.subject.plan, &cases, self.twin.is_some())
     }
 }
 

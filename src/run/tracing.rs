@@ -36,11 +36,11 @@ impl Studio<'_> {
     ) -> Result<(Vec<Pair>, usize), Halt> {
         let set = self.set;
         let Some(twin) = &set.twin else { return Ok((Vec::new(), 0)) };
-        let settings = &set.plan.suite.file.judge;
-        let seed = set.plan.seed.wrapping_add(JUDGE);
+        let settings = &set.subject.plan.suite.file.judge;
+        let seed = set.subject.plan.seed.wrapping_add(JUDGE);
         let paths = settings.paths.get();
         let most = settings.max_replicates.get() as usize;
-        let key = Key { scene: &set.hash, paths, seed };
+        let key = Key { scene: &set.subject.facts.hash, paths, seed };
         let load = |c: &JudgeCache| c.load(&key, set.view.resolution);
         let mut pairs = self.means.cache.map_or_else(Vec::new, load);
         let cached = pairs.len();
@@ -61,9 +61,9 @@ impl Studio<'_> {
                 };
                 pairs.push(pair);
             }
-            super::faults::check_judge(&pairs[..used], &set.regions, set.view.resolution[0]).map_err(Halt::Failed)?;
+            super::faults::check_judge(&pairs[..used], &set.subject.regions, set.view.resolution[0]).map_err(Halt::Failed)?;
             // Where regions are too small for a judge, measuring says so.
-            let Ok(judge) = JudgedRegions::new(&pairs[..used], &set.regions) else { break };
+            let Ok(judge) = JudgedRegions::new(&pairs[..used], &set.subject.regions) else { break };
             if judge.widest() <= settings.precision || used >= most {
                 break;
             }
@@ -87,15 +87,15 @@ impl Studio<'_> {
         for replicate in 0..CONVERGED_REPLICATES {
             let job = Job {
                 view: &set.view,
-                camera: set.camera(),
-                estimator: set.plan.suite.methods[method].estimator.unsmoothed(),
+                camera: set.camera.as_ref(),
+                estimator: set.subject.plan.suite.methods[method].estimator.unsmoothed(),
                 ao: set.scene.ao,
-                rays: set.plan.suite.file.converged_rays.get() / CONVERGED_REPLICATES,
-                seed: set.plan.seed.wrapping_add(CONVERGED),
+                rays: set.subject.plan.suite.file.converged_rays.get() / CONVERGED_REPLICATES,
+                seed: set.subject.plan.seed.wrapping_add(CONVERGED),
                 replicate,
             };
             let frame = frame(loaded, &job, clock, "replicates", [replicate, CONVERGED_REPLICATES])?;
-            let checked = super::faults::check_frame(&frame, set.regions(method), replicate);
+            let checked = super::faults::check_frame(&frame, set.subject.regions(method), replicate);
             fault = fault.or_else(|| checked.err().map(|e| e.to_string()));
             replicates.push(frame.values);
         }
@@ -111,20 +111,20 @@ impl Studio<'_> {
         clock: &Clock<'_>,
     ) -> Result<Images, Halt> {
         let set = self.set;
-        let method = set.method(case);
+        let method = set.subject.method(case);
         let (mut images, mut seconds) = known.map_or_else(|| (Vec::new(), 0.0), |i| (i.replicates, i.seconds));
         for replicate in images.len() as u32..replicates {
             let job = Job {
                 view: &set.view,
-                camera: set.camera(),
-                estimator: set.plan.suite.methods[method].estimator,
+                camera: set.camera.as_ref(),
+                estimator: set.subject.plan.suite.methods[method].estimator,
                 ao: set.scene.ao,
                 rays: case.rays,
-                seed: set.plan.seed,
+                seed: set.subject.plan.seed,
                 replicate,
             };
             let frame = frame(loaded, &job, clock, "replicates", [replicate, replicates])?;
-            super::faults::check_frame(&frame, set.regions(method), replicate)?;
+            super::faults::check_frame(&frame, set.subject.regions(method), replicate)?;
             images.push(frame.values);
             seconds += frame.seconds;
         }
@@ -136,13 +136,13 @@ impl Studio<'_> {
     pub(super) fn look(&self, cpu: &mut dyn Loaded, clock: &Clock<'_>) -> Result<Layers, Halt> {
         let set = self.set;
         let view = set.scene.look.view();
-        let rays = set.plan.suite.file.look_rays.get();
-        let seed = set.plan.seed.wrapping_add(LOOK);
+        let rays = set.subject.plan.suite.file.look_rays.get();
+        let seed = set.subject.plan.seed.wrapping_add(LOOK);
         let mut layers = Layers::new(view.resolution);
-        let methods = set.plan.methods();
+        let methods = set.subject.plan.methods();
         let all = methods.len() as u32 + 1;
         for (done, method) in (0..).zip(methods) {
-            let method = &set.plan.suite.methods[method];
+            let method = &set.subject.plan.suite.methods[method];
             let job = Job {
                 view: &view,
                 camera: None,

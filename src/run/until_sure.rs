@@ -52,9 +52,9 @@ struct Sight<'a> {
 impl Studio<'_> {
     /// Renders a scene as the plan says. Returns how many replicates each case has.
     pub fn scene(&self, rendered: &mut Rendered) -> Result<Counts, RunError> {
-        let replicates = self.set.plan.suite.file.replicates.get();
+        let replicates = self.set.subject.plan.suite.file.replicates.get();
         let all = Counts::all(replicates);
-        let until_sure = self.set.plan.until_sure;
+        let until_sure = self.set.subject.plan.until_sure;
         if until_sure.is_none() && !self.means.fail_fast {
             self.render(&self.set.units(), replicates, rendered)?;
             return Ok(all);
@@ -62,14 +62,14 @@ impl Studio<'_> {
         let (cases, first): (Vec<Unit<'_>>, Vec<Unit<'_>>) =
             self.set.units().into_iter().partition(|u| matches!(u, Unit::Case(_)));
         self.render(&first, replicates, rendered)?;
-        if !self.set.is_ready(rendered) || cases.is_empty() || self.means.stop.is_asked() {
+        if !self.set.subject.is_ready(rendered) || cases.is_empty() || self.means.stop.is_asked() {
             return Ok(if until_sure.is_some() { Counts::default() } else { all });
         }
-        let judged = self.set.judge(self.journal.folder, rendered)?;
-        let plan = self.set.plan;
+        let judged = self.set.subject.judge(self.journal.folder, rendered)?;
+        let plan = self.set.subject.plan;
         let scenes: Vec<&str> = plan.scenes().map(|s| s.name.as_str()).collect();
         let sight = Sight {
-            scene: self.set.scene_facts(rendered, &judged),
+            scene: self.set.subject.scene_facts(rendered, &judged),
             judged: &judged,
             family: family_at_most(&plan.suite.gates, &scenes, &plan.cases),
         };
@@ -80,7 +80,7 @@ impl Studio<'_> {
         };
         let counts = self.until_sure(most, &sight, rendered)?;
         if !counts.stopped {
-            for case in self.set.cases() {
+            for case in self.set.subject.cases() {
                 self.trim(case, counts.replicates(case), rendered)?;
             }
         }
@@ -90,9 +90,9 @@ impl Studio<'_> {
     /// Renders the cases of a scene until their verdicts are decided. Returns how many
     /// replicates each has and which look that was.
     fn until_sure(&self, most: u32, sight: &Sight<'_>, rendered: &mut Rendered) -> Result<Counts, RunError> {
-        let (set, plan) = (self.set, self.set.plan);
+        let (set, plan) = (self.set, self.set.subject.plan);
         let mut counts = Counts::default();
-        let mut open: BTreeSet<u32> = set.cases().map(|c| block(plan, c)).collect();
+        let mut open: BTreeSet<u32> = set.subject.cases().map(|c| block(plan, c)).collect();
         let end = |rays: u32, replicates: u32, by: Budget| {
             let scene = set.scene.name.clone();
             Undecided { scene, rays, replicates, by }
@@ -108,7 +108,7 @@ impl Studio<'_> {
             if open.is_empty() {
                 return Ok(counts);
             }
-            let units: Vec<Unit<'_>> = set.cases().filter(|c| open.contains(&block(plan, c))).map(Unit::Case).collect();
+            let units: Vec<Unit<'_>> = set.subject.cases().filter(|c| open.contains(&block(plan, c))).map(Unit::Case).collect();
             if !self.means.stop.is_asked() {
                 self.render(&units, n, rendered)?;
             }
@@ -116,7 +116,7 @@ impl Studio<'_> {
                 counts.stopped = true;
                 return Ok(counts);
             }
-            for case in set.cases().filter(|c| open.contains(&block(plan, c))) {
+            for case in set.subject.cases().filter(|c| open.contains(&block(plan, c))) {
                 counts.set(case, n, look);
             }
             let verdicts = self.verdicts(sight, rendered, &counts);
@@ -139,7 +139,7 @@ impl Studio<'_> {
     /// Whether a block must do without another look, of `n` replicates. What is there
     /// already costs no time; in a merge that is all there is.
     fn is_spent(&self, rays: u32, n: u32, rendered: &Rendered) -> bool {
-        let (plan, name) = (self.set.plan, &self.set.scene.name);
+        let (plan, name) = (self.set.subject.plan, &self.set.scene.name);
         if self.means.is_merge {
             let of = |e: &Undecided| e.scene == *name && e.rays == rays && e.replicates < n;
             return self.means.ended.iter().any(of);
@@ -150,20 +150,20 @@ impl Studio<'_> {
             None => false,
         };
         self.until.is_some_and(|end| Instant::now() >= end)
-            && !self.set.cases().filter(|c| block(plan, c) == rays).all(is_there)
+            && !self.set.subject.cases().filter(|c| block(plan, c) == rays).all(is_there)
     }
 
     /// The verdicts on what there is of the scene.
     fn verdicts(&self, sight: &Sight<'_>, rendered: &Rendered, counts: &Counts) -> Vec<Verdict> {
-        let cases: Vec<CaseRecord> = self.set.case_records(rendered, sight.judged, counts);
+        let cases: Vec<CaseRecord> = self.set.subject.case_records(rendered, sight.judged, counts);
         let evidence = Evidence {
-            suite: &suite_info(self.set.plan),
+            suite: &suite_info(self.set.subject.plan),
             gpu: "",
             filter: Some(""),
             scenes: std::slice::from_ref(&sight.scene),
             cases: &cases,
-            base: self.set.plan.base.as_ref(),
-            no_base: self.set.plan.no_base,
+            base: self.set.subject.plan.base.as_ref(),
+            no_base: self.set.subject.plan.no_base,
         };
         judge(&evidence).0
     }
@@ -178,7 +178,7 @@ impl Studio<'_> {
             let is_broken = decided([p[1], f64::NAN], family, v.spent, alpha);
             let warns = |p: [f64; 2]| decided(p, family, v.spent, alpha);
             let sure = is_broken || decided(p, family, v.spent, alpha) && warning(v).is_none_or(warns);
-            Some((block(self.set.plan, case), v.can_be_decided(family))).filter(|_| !sure)
+            Some((block(self.set.subject.plan, case), v.can_be_decided(family))).filter(|_| !sure)
         });
         let (open, kept): (Vec<_>, Vec<_>) = unsure.partition(|(_, can_be_decided)| *can_be_decided);
         let blocks = |of: Vec<(u32, bool)>| of.into_iter().map(|(block, _)| block).collect();
@@ -188,7 +188,7 @@ impl Studio<'_> {
     /// A gate that is surely red, whatever the other verdicts of the plan come to: as for
     /// what ends a block, by Bonferroni's correction, so that Holm's leaves it red.
     fn red(&self, sight: &Sight<'_>, verdicts: &[Verdict]) -> Option<String> {
-        let known = |gate: &str| self.set.plan.suite.gates.iter().any(|g| g.name == gate && g.known_failure.is_some());
+        let known = |gate: &str| self.set.subject.plan.suite.gates.iter().any(|g| g.name == gate && g.known_failure.is_some());
         let is_red = |v: &&Verdict| {
             let p = if known(&v.gate) { v.p_holds } else { v.p_broken };
             p.is_some_and(|p| decided([p.raw, f64::NAN], sight.family, v.spent, 1.0 - v.confidence))
