@@ -8,12 +8,14 @@
 mod end;
 mod folder;
 pub mod pictures;
+mod source;
 mod until_sure;
 mod version;
 
 pub use end::End;
 pub use folder::RecordFolder;
 pub(crate) use folder::{aside, is_aside};
+pub use source::{HandedIn, Intervals, Shows, Source, UndoneCurve};
 pub use until_sure::{Budget, Undecided, UntilSure};
 
 use crate::{
@@ -75,6 +77,10 @@ pub struct Record {
     /// Whether it was run without a base record on purpose (`--no-base`).
     #[serde(skip_serializing_if = "std::ops::Not::not", default)]
     pub no_base: bool,
+    /// Whose images were measured, where they were handed in; absent where they were
+    /// rendered here.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub handed_in: Option<HandedIn>,
     /// What the run came to.
     pub summary: Summary,
     /// Failures first, then in the order of gates and cases.
@@ -383,6 +389,9 @@ pub struct CaseRecord {
     /// the run is incomplete. The suite's where absent.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub replicates: Option<u32>,
+    /// What its images were read from, where they were handed in.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub source: Option<Source>,
     /// Its metrics by occluder, where the scene shows two or more.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub occluders: Vec<OccluderMetrics>,
@@ -399,6 +408,7 @@ impl CaseRecord {
             metrics: vec![],
             looks: None,
             replicates: None,
+            source: None,
             occluders: vec![],
         }
     }

@@ -8,6 +8,7 @@ pub mod image;
 pub mod judge;
 pub mod profile;
 pub mod regions;
+pub mod tiles;
 
 use crate::stats::Estimate;
 use regions::Region;

@@ -62,6 +62,12 @@ impl Regions {
         Finder::new(scene, tracer).regions(gbuffer)
     }
 
+    /// Regions from masks, as [`Regions::mask`] makes them: what is above 0 belongs to them.
+    pub fn of_masks<'m>(mask: impl Fn(Region) -> &'m [f32]) -> Self {
+        let pixels = |region| (0..).zip(mask(region)).filter(|(_, v)| **v > 0.0).map(|(i, _)| i).collect();
+        Regions { pixels: Region::ALL.map(pixels) }
+    }
+
     /// The same regions without the pixels that `keep` refuses.
     #[must_use]
     pub fn only(&self, keep: impl Fn(u32) -> bool) -> Regions {

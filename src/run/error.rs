@@ -39,6 +39,17 @@ pub enum RunError {
         /// Width of the view, pixels.
         columns: u32,
     },
+    /// It was asked to stop before it was done.
+    #[error("it was interrupted; what is done is kept, and the same command goes on from here")]
+    Stopped,
+    /// What images would be scored against cannot be made.
+    #[error("scene '{scene}': its references cannot be used: {why}")]
+    Reference {
+        /// The scene.
+        scene: String,
+        /// Why.
+        why: String,
+    },
     /// No light reaches the receiver, so there is nothing to judge.
     #[error(
         "scene '{scene}': no light reaches the receiver even without the occluder; check environment and the openings towards it"

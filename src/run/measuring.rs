@@ -88,7 +88,11 @@ impl Subject<'_> {
     }
 
     /// The judge of the pixels that a method is measured on.
-    fn judge_of<'b>(&self, method: usize, judged: &'b Result<Judged, Unjudged>) -> Result<&'b JudgedRegions, Absent> {
+    pub(super) fn judge_of<'b>(
+        &self,
+        method: usize,
+        judged: &'b Result<Judged, Unjudged>,
+    ) -> Result<&'b JudgedRegions, Absent> {
         let judged = judged.as_ref().map_err(Unjudged::absent)?;
         if is_on_screen(&self.plan.suite.methods[method]) {
             return judged.on_screen.as_ref().map_err(Clone::clone);
@@ -146,6 +150,7 @@ impl Subject<'_> {
                 metrics: metrics(&method, &others),
                 replicates: Some(replicates.len() as u32),
                 looks: counts.look(case),
+                source: None,
                 occluders: self.by_occluder(index, &method, &classic_on, judged),
             });
         }
@@ -153,7 +158,7 @@ impl Subject<'_> {
     }
 
     /// The metrics of a case under each occluder of several.
-    fn by_occluder<'b>(
+    pub(super) fn by_occluder<'b>(
         &'b self,
         index: usize,
         method: &Measured<'b>,

@@ -17,7 +17,9 @@ mod occluders;
 mod on_screen;
 mod progress;
 mod recording;
+mod references;
 mod rendering;
+mod scoring;
 mod set;
 mod shard;
 mod stop;
@@ -29,8 +31,11 @@ mod until_sure;
 pub use error::RunError;
 pub use merge::{MergeError, Shards, find as find_shards};
 pub use progress::Observer;
+pub use references::{References, ReferencesFile, SceneReferences};
+pub use scoring::Handed;
 pub use shard::{Shard, ShardRecord};
 pub use stop::Stop;
+pub use subject::Facts;
 
 #[cfg(test)]
 mod mutations;
@@ -41,8 +46,8 @@ use crate::{
     layers::hex,
     pooled::pooled,
     record::{
-        CaseRecord, Machine, Record, RecordFolder, SceneRecord, SuiteInfo, Summary, Timing, Undecided, UntilSure,
-        VERSION,
+        CaseRecord, HandedIn, Machine, Record, RecordFolder, SceneRecord, SuiteInfo, Summary, Timing, Undecided,
+        UntilSure, VERSION,
     },
     render::Renderer,
     suite::{Case, EstimatorFile, Plan, Suite},
@@ -218,47 +223,63 @@ impl<'a> Prepared<'a> {
             }),
         };
         timing.seconds = start.elapsed().as_secs_f64();
-        Ok(self.record(means.machine.clone(), timing, end, scenes, cases))
-    }
-
-    fn record(
-        &self,
-        machine: Machine,
-        timing: Timing,
-        end: End,
-        scenes: Vec<SceneRecord>,
-        cases: Vec<CaseRecord>,
-    ) -> Record {
-        let plan = self.plan;
-        let suite = suite_info(plan);
-        let evidence = Evidence {
-            suite: &suite,
-            gpu: &machine.gpu,
-            filter: plan.filter.as_deref(),
-            scenes: &scenes,
-            cases: &cases,
-            base: plan.base.as_ref(),
-            no_base: plan.no_base,
-        };
-        let (verdicts, idle_gates) = judge(&evidence);
-        Record {
-            version: VERSION,
-            tool: env!("CARGO_PKG_VERSION").to_owned(),
-            seed: plan.seed,
-            machine,
-            filter: plan.filter.clone(),
-            until_sure: end.until_sure,
-            incomplete: end.incomplete,
-            no_base: plan.no_base,
-            summary: Summary::new(&verdicts, &idle_gates, &scenes, &cases),
-            pooled: pooled(&suite, &scenes, &cases),
-            verdicts,
-            idle_gates,
+        Ok(record(Found {
+            plan: self.plan,
+            suite: suite_info(self.plan),
+            machine: means.machine.clone(),
+            timing,
+            end,
             scenes,
             cases,
-            suite,
-            timing,
-        }
+            handed_in: None,
+        }))
+    }
+}
+
+/// All that a record is made of.
+struct Found<'a> {
+    plan: &'a Plan<'a>,
+    suite: SuiteInfo,
+    machine: Machine,
+    timing: Timing,
+    end: End,
+    scenes: Vec<SceneRecord>,
+    cases: Vec<CaseRecord>,
+    handed_in: Option<HandedIn>,
+}
+
+/// Judges what was found.
+fn record(found: Found<'_>) -> Record {
+    let Found { plan, suite, machine, timing, end, scenes, cases, handed_in } = found;
+    let evidence = Evidence {
+        suite: &suite,
+        gpu: &machine.gpu,
+        filter: plan.filter.as_deref(),
+        scenes: &scenes,
+        cases: &cases,
+        base: plan.base.as_ref(),
+        no_base: plan.no_base,
+        handed_in: handed_in.is_some(),
+    };
+    let (verdicts, idle_gates) = judge(&evidence);
+    Record {
+        version: VERSION,
+        tool: env!("CARGO_PKG_VERSION").to_owned(),
+        seed: plan.seed,
+        machine,
+        filter: plan.filter.clone(),
+        until_sure: end.until_sure,
+        incomplete: end.incomplete,
+        no_base: plan.no_base,
+        handed_in,
+        summary: Summary::new(&verdicts, &idle_gates, &scenes, &cases),
+        pooled: pooled(&suite, &scenes, &cases),
+        verdicts,
+        idle_gates,
+        scenes,
+        cases,
+        suite,
+        timing,
     }
 }
 
@@ -277,7 +298,9 @@ fn at_first_failure(what: &str) -> String {
 /// decides must be together, and a shard takes whole scenes.
 fn mine<'a>(set: &Set<'a>, shard: Option<Shard>) -> Vec<Unit<'a>> {
     let name = &set.scene.name;
-    let key = |unit: &Unit<'a>| if set.subject.plan.until_sure.is_some() { name.clone() } else { unit.id(set.subject.plan, name) };
+    let key = |unit: &Unit<'a>| {
+        if set.subject.plan.until_sure.is_some() { name.clone() } else { unit.id(set.subject.plan, name) }
+    };
     let is_mine = |unit: &Unit<'a>| shard.is_none_or(|s| shard_of(&key(unit), s.of) == s.index - 1);
     set.units().into_iter().filter(is_mine).collect()
 }

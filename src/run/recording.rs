@@ -48,9 +48,12 @@ impl Subject<'_> {
             let own = methods[method].rays;
             own.or_else(|| self.plan.suite.file.rays.iter().copied().max()).map_or(0, Rays::get)
         };
+        // Images that were handed in are of one renderer of their own.
+        let is_on_cpu = self.cases().any(|c| c.renderer == "cpu");
+        let renderer = if is_on_cpu { "cpu" } else { self.cases().next().map_or("", |c| &c.renderer) };
         scene.profiles = self
             .cases()
-            .filter(|c| c.renderer == "cpu" && c.rays == most(self.method(c)))
+            .filter(|c| c.renderer == renderer && c.rays == most(self.method(c)))
             .filter_map(|c| Some(profile::of_method(&c.estimator, rendered.replicates(c, counts)?, width as usize)))
             .collect();
         scene.profiles.extend(judged.as_ref().ok().map(|j| j.curve.clone()));
@@ -119,7 +122,10 @@ impl Subject<'_> {
             let of_key = |c: &&Case| c.estimator == estimator && c.renderer == renderer;
             let Some(index) = self.cases().find(of_key).map(|c| self.method(c)) else { continue };
             let Some(truth) = rendered.truths.get(&index) else { continue };
-            let level = |c: &Case| Some(Level { rays: c.rays, replicates: rendered.replicates(c, counts)? });
+            let level = |c: &Case| {
+                let replicates = rendered.replicates(c, counts).filter(|r| r.len() > 1)?;
+                Some(Level { rays: c.rays, replicates })
+            };
             let levels: Vec<Level<'_>> = self.cases().filter(of_key).filter_map(level).collect();
             let regions = self.regions(index);
             for region in [Region::All, Region::Footprint] {

@@ -288,33 +288,18 @@ impl Studio<'_> {
     /// The images of a unit as the file that they are kept in.
     fn layers(&self, unit: &Unit<'_>, product: &Product) -> Layers {
         let size = self.set.view.resolution;
-        let all = |layers: Layers, replicates: &[Vec<f32>]| {
-            replicates.iter().enumerate().fold(layers, |l, (r, v)| l.with(&journal::replicate(r), v.clone()))
-        };
         match (unit, product) {
             (_, Product::Judge(pairs, _)) => journal::of_pairs(size, pairs),
             (_, Product::Converged(truth)) => {
-                let mut layers = all(Layers::new(size), &truth.converged.replicates);
+                let mut layers = with_replicates(Layers::new(size), &truth.converged.replicates);
                 layers.attributes.extend(truth.fault.clone().map(|why| ("fault".to_owned(), why)));
                 layers
             }
             (_, Product::Look(layers)) => layers.clone(),
             (Unit::Case(case), Product::Case(images)) => {
-                let (mean, variance) = moments(&images.replicates, self.set.view.pixels());
-                let mut layers =
-                    all(Layers::new(size).with("mean", mean).with("variance", variance), &images.replicates);
-                // What whoever compares the file alone must know.
-                let attributes = [
-                    ("scene", case.scene.clone()),
-                    ("estimator", case.estimator.clone()),
-                    ("renderer", case.renderer.clone()),
-                    ("rays", case.rays.to_string()),
-                    ("seed", self.set.subject.plan.seed.to_string()),
-                ];
-                layers.attributes.extend(attributes.map(|(name, text)| (name.to_owned(), text)));
-                layers
+                case_layers(size, case, &images.replicates, Some(self.set.subject.plan.seed))
             }
-            (_, Product::Case(images)) => all(Layers::new(size), &images.replicates),
+            (_, Product::Case(images)) => with_replicates(Layers::new(size), &images.replicates),
         }
     }
 
@@ -383,6 +368,26 @@ impl Rendered {
             _ => {}
         }
     }
+}
+
+fn with_replicates(layers: Layers, replicates: &[Vec<f32>]) -> Layers {
+    replicates.iter().enumerate().fold(layers, |l, (r, v)| l.with(&journal::replicate(r), v.clone()))
+}
+
+/// The images of a case as a record keeps them.
+pub(super) fn case_layers(size: [u32; 2], case: &Case, replicates: &[Vec<f32>], seed: Option<u32>) -> Layers {
+    let (mean, variance) = moments(replicates, size[0] as usize * size[1] as usize);
+    let mut layers = with_replicates(Layers::new(size).with("mean", mean).with("variance", variance), replicates);
+    // What whoever compares the file alone must know.
+    let attributes = [
+        ("scene", Some(case.scene.clone())),
+        ("estimator", Some(case.estimator.clone())),
+        ("renderer", Some(case.renderer.clone())),
+        ("rays", Some(case.rays.to_string())),
+        ("seed", seed.map(|s| s.to_string())),
+    ];
+    layers.attributes.extend(attributes.into_iter().filter_map(|(name, text)| Some((name.to_owned(), text?))));
+    layers
 }
 
 /// Mean and variance of each pixel.

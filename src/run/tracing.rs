@@ -61,7 +61,8 @@ impl Studio<'_> {
                 };
                 pairs.push(pair);
             }
-            super::faults::check_judge(&pairs[..used], &set.subject.regions, set.view.resolution[0]).map_err(Halt::Failed)?;
+            super::faults::check_judge(&pairs[..used], &set.subject.regions, set.view.resolution[0])
+                .map_err(Halt::Failed)?;
             // Where regions are too small for a judge, measuring says so.
             let Ok(judge) = JudgedRegions::new(&pairs[..used], &set.subject.regions) else { break };
             if judge.widest() <= settings.precision || used >= most {

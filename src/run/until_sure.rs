@@ -108,7 +108,8 @@ impl Studio<'_> {
             if open.is_empty() {
                 return Ok(counts);
             }
-            let units: Vec<Unit<'_>> = set.subject.cases().filter(|c| open.contains(&block(plan, c))).map(Unit::Case).collect();
+            let units: Vec<Unit<'_>> =
+                set.subject.cases().filter(|c| open.contains(&block(plan, c))).map(Unit::Case).collect();
             if !self.means.stop.is_asked() {
                 self.render(&units, n, rendered)?;
             }
@@ -164,6 +165,7 @@ impl Studio<'_> {
             cases: &cases,
             base: self.set.subject.plan.base.as_ref(),
             no_base: self.set.subject.plan.no_base,
+            handed_in: false,
         };
         judge(&evidence).0
     }
@@ -188,7 +190,8 @@ impl Studio<'_> {
     /// A gate that is surely red, whatever the other verdicts of the plan come to: as for
     /// what ends a block, by Bonferroni's correction, so that Holm's leaves it red.
     fn red(&self, sight: &Sight<'_>, verdicts: &[Verdict]) -> Option<String> {
-        let known = |gate: &str| self.set.subject.plan.suite.gates.iter().any(|g| g.name == gate && g.known_failure.is_some());
+        let known =
+            |gate: &str| self.set.subject.plan.suite.gates.iter().any(|g| g.name == gate && g.known_failure.is_some());
         let is_red = |v: &&Verdict| {
             let p = if known(&v.gate) { v.p_holds } else { v.p_broken };
             p.is_some_and(|p| decided([p.raw, f64::NAN], sight.family, v.spent, 1.0 - v.confidence))

@@ -132,7 +132,7 @@ impl Suite {
         if let Some(name) = &parsed.name {
             aogauge_scenes::check_name(name).map_err(|e| invalid(format!("name: {e}")))?;
         }
-        let name = parsed.name.as_deref().unwrap_or(name);
+        let name = parsed.name.as_deref().unwrap_or(name).to_owned();
         let mut scenes: Vec<Scene> = Vec::with_capacity(parsed.scenes.len());
         for scene in &parsed.scenes {
             let scene = if scene.ends_with(".toml") {
@@ -145,61 +145,20 @@ impl Suite {
             }
             scenes.push(scene);
         }
-        for (list, empty) in [("scenes", scenes.is_empty()), ("rays", parsed.rays.is_empty())] {
-            if empty {
-                return Err(invalid(format!("{list} is empty: name at least one")));
-            }
-        }
-        if let Some(i) = (1..parsed.rays.len()).find(|&i| parsed.rays[..i].contains(&parsed.rays[i])) {
-            return Err(invalid(format!("rays: {} is given twice", parsed.rays[i].get())));
-        }
-        if let Some(rays) = parsed.golden_rays.filter(|r| !parsed.rays.contains(r)) {
-            return Err(invalid(format!("golden_rays is {}, which is not among rays", rays.get())));
-        }
-        let methods = methods(&parsed).map_err(invalid)?;
-        let all_rays = || parsed.rays.iter().copied().chain(methods.iter().filter_map(|m| m.rays));
-        let most = all_rays().map(Rays::get).max().unwrap_or(0);
-        let converged = parsed.converged_rays.get();
-        if converged < 4 * most || !converged.is_multiple_of(4) {
-            return Err(invalid(format!(
-                "converged_rays is {converged}: it must be a multiple of 4 and at least 4 times the most rays, {most}"
-            )));
-        }
-        if parsed.judge.max_replicates.get() < parsed.judge.replicates.get() {
-            return Err(invalid("judge.max_replicates must not be below judge.replicates".into()));
-        }
-        let mut gates = Vec::with_capacity(parsed.gates.len());
-        let names = |of: &str, list: &[String], known: &mut dyn Iterator<Item = &str>, field: &str| {
-            let known: Vec<&str> = known.collect();
-            match list.iter().find(|n| !known.contains(&n.as_str())) {
-                Some(n) => Err(invalid(format!(
-                    "{of}: {field} names '{n}', which the suite does not have; it has {}",
-                    known.join(", ")
-                ))),
-                None => Ok(()),
-            }
-        };
-        let traced = |of: &str, rays: &[Rays]| match rays.iter().find(|r| !all_rays().any(|own| own == **r)) {
-            Some(r) => Err(invalid(format!("{of}: rays names {}, which the suite does not trace", r.get()))),
-            None => Ok(()),
-        };
-        if let Some(marked) = &parsed.software_adapter {
-            gate::once("scenes", &marked.scenes).map_err(|e| invalid(format!("software_adapter: {e}")))?;
-            names("software_adapter", &marked.scenes, &mut scenes.iter().map(|s| s.name.as_str()), "scenes")?;
-            traced("software_adapter", &marked.rays)?;
-        }
-        for gate in &parsed.gates {
-            let of = format!("gate '{}'", gate.name);
-            names(&of, &gate.scenes, &mut scenes.iter().map(|s| s.name.as_str()), "scenes")?;
-            names(&of, &gate.estimators, &mut methods.iter().map(|m| m.name.as_str()), "estimators")?;
-            if parsed.gates.iter().filter(|g| g.name == gate.name).count() > 1 {
-                return Err(invalid(format!("two gates are called '{}'", gate.name)));
-            }
-            names(&of, &gate.renderers, &mut ["cpu", "gpu"].into_iter(), "renderers")?;
-            traced(&of, &gate.rays)?;
-            gates.push(gate.build(&methods).map_err(|e| invalid(format!("{of}: {e}")))?);
-        }
-        Ok(Suite { name: name.to_owned(), file: parsed, scenes, methods, gates })
+        let names: Vec<&str> = scenes.iter().map(|s| s.name.as_str()).collect();
+        let (methods, gates) = checked(&parsed, &names).map_err(invalid)?;
+        Ok(Suite { name, file: parsed, scenes, methods, gates })
+    }
+
+    /// A suite whose scenes are known by name only: enough to measure and to judge, not to
+    /// render. `label` is what errors call the file it comes from.
+    ///
+    /// # Errors
+    /// [`SuiteError::Invalid`], which names the field.
+    pub fn without_scenes(name: &str, label: &str, file: SuiteFile, scenes: &[&str]) -> Result<Self, SuiteError> {
+        let (methods, gates) =
+            checked(&file, scenes).map_err(|message| SuiteError::Invalid { file: label.to_owned(), message })?;
+        Ok(Suite { name: name.to_owned(), file, scenes: Vec::new(), methods, gates })
     }
 
     /// The case of classic AO that a case is compared with: the one of as many
@@ -213,6 +172,79 @@ impl Suite {
     /// The index of the method that is classic AO.
     pub fn classic(&self) -> usize {
         self.methods.iter().position(Method::is_classic).unwrap_or(0)
+    }
+}
+
+/// The methods and gates of a suite file, checked against each other and the names of its
+/// scenes; errors name the field.
+fn checked(file: &SuiteFile, scenes: &[&str]) -> Result<(Vec<Method>, Vec<Gate>), String> {
+    for (list, empty) in [("scenes", scenes.is_empty()), ("rays", file.rays.is_empty())] {
+        if empty {
+            return Err(format!("{list} is empty: name at least one"));
+        }
+    }
+    if let Some(i) = (1..file.rays.len()).find(|&i| file.rays[..i].contains(&file.rays[i])) {
+        return Err(format!("rays: {} is given twice", file.rays[i].get()));
+    }
+    if let Some(rays) = file.golden_rays.filter(|r| !file.rays.contains(r)) {
+        return Err(format!("golden_rays is {}, which is not among rays", rays.get()));
+    }
+    let methods = methods(file)?;
+    let most = all_rays(file, &methods).map(Rays::get).max().unwrap_or(0);
+    let converged = file.converged_rays.get();
+    if converged < 4 * most || !converged.is_multiple_of(4) {
+        return Err(format!(
+            "converged_rays is {converged}: it must be a multiple of 4 and at least 4 times the most rays, {most}"
+        ));
+    }
+    if file.judge.max_replicates.get() < file.judge.replicates.get() {
+        return Err("judge.max_replicates must not be below judge.replicates".into());
+    }
+    if let Some(marked) = &file.software_adapter {
+        gate::once("scenes", &marked.scenes).map_err(|e| format!("software_adapter: {e}"))?;
+        known("software_adapter", &marked.scenes, scenes, "scenes")?;
+        traced("software_adapter", &marked.rays, file, &methods)?;
+    }
+    let gates = gates(&file.gates, file, scenes, &methods)?;
+    Ok((methods, gates))
+}
+
+/// The gates of a suite, or others in place of them.
+fn gates(entries: &[GateFile], file: &SuiteFile, scenes: &[&str], methods: &[Method]) -> Result<Vec<Gate>, String> {
+    let names: Vec<&str> = methods.iter().map(|m| m.name.as_str()).collect();
+    let mut gates = Vec::with_capacity(entries.len());
+    for gate in entries {
+        let of = format!("gate '{}'", gate.name);
+        known(&of, &gate.scenes, scenes, "scenes")?;
+        known(&of, &gate.estimators, &names, "estimators")?;
+        if entries.iter().filter(|g| g.name == gate.name).count() > 1 {
+            return Err(format!("two gates are called '{}'", gate.name));
+        }
+        known(&of, &gate.renderers, &["cpu", "gpu"], "renderers")?;
+        traced(&of, &gate.rays, file, methods)?;
+        gates.push(gate.build(methods).map_err(|e| format!("{of}: {e}"))?);
+    }
+    Ok(gates)
+}
+
+fn all_rays(file: &SuiteFile, methods: &[Method]) -> impl Iterator<Item = Rays> {
+    file.rays.iter().copied().chain(methods.iter().filter_map(|m| m.rays))
+}
+
+/// Whether a list names only what there is.
+fn known(of: &str, list: &[String], known: &[&str], field: &str) -> Result<(), String> {
+    match list.iter().find(|n| !known.contains(&n.as_str())) {
+        Some(n) => {
+            Err(format!("{of}: {field} names '{n}', which the suite does not have; it has {}", known.join(", ")))
+        }
+        None => Ok(()),
+    }
+}
+
+fn traced(of: &str, rays: &[Rays], file: &SuiteFile, methods: &[Method]) -> Result<(), String> {
+    match rays.iter().find(|r| !all_rays(file, methods).any(|own| own == **r)) {
+        Some(r) => Err(format!("{of}: rays names {}, which the suite does not trace", r.get())),
+        None => Ok(()),
     }
 }
 

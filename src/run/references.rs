@@ -1,0 +1,389 @@
+//! What images are scored against: of every scene its regions, its judge and the converged
+//! images of the suite's methods, in a folder. Scoring needs nothing else: no geometry, no
+//! suite file, and nothing is rendered for it.
+
+use super::{
+    Means, Observer, Prepared, RunError,
+    journal::{self, Journal},
+    occluders::Occluder,
+    on_screen::Shown,
+    progress::Progress,
+    rendering::{Rendered, Studio, Truth},
+    set::Set,
+    subject::{Facts, Subject},
+    unit::{CONVERGED_REPLICATES, Unit},
+};
+use crate::{
+    disk::{DiskError, read_text, write_whole},
+    layers::Layers,
+    metrics::{
+        artifact::Converged,
+        regions::{Region, Regions},
+    },
+    record::{RecordFolder, ScreenRecord},
+    suite::{Plan, Suite, SuiteFile},
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::{
+    collections::BTreeMap,
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+/// Version of the format, as it is written and read.
+pub const VERSION: u32 = 1;
+
+/// The file that makes a folder one of references. It is written last.
+pub const FILE: &str = "scoring.json";
+
+/// Its content.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ReferencesFile {
+    /// Version of this format.
+    pub version: u32,
+    /// Version of the tool that wrote it.
+    pub tool: String,
+    /// Name of the suite.
+    pub suite: String,
+    /// The suite as it was written.
+    pub file: SuiteFile,
+    /// Seed of the judge and the converged images.
+    pub seed: u32,
+    /// The scenes, in the suite's order.
+    pub scenes: Vec<SceneReferences>,
+}
+
+/// What there is of a scene; its images lie in a folder of its name.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SceneReferences {
+    /// The scene.
+    pub facts: Facts,
+    /// Its occluders, where the view shows two or more.
+    pub occluders: Vec<String>,
+    /// The camera of screen-space methods, in suites with such methods.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub screen: Option<ScreenRecord>,
+    /// SHA-256 of each image.
+    pub images: BTreeMap<String, String>,
+}
+
+const REGIONS: &str = "regions.exr";
+const JUDGE: &str = "judge.exr";
+const LOOK: &str = "look.exr";
+
+fn converged(method: &str) -> String {
+    format!("converged-{method}.exr")
+}
+
+/// The layer of a region: of all occluders or of one, of the view or of what a screen shows.
+fn layer(occluder: Option<usize>, shown: bool, region: Region) -> String {
+    let of = occluder.map_or_else(|| "region".to_owned(), |i| format!("occluder-{i:03}"));
+    let shown = if shown { "-shown" } else { "" };
+    format!("{of}{shown}-{}", region.label())
+}
+
+/// References as they were read.
+#[derive(Debug)]
+pub struct References {
+    folder: PathBuf,
+    file: ReferencesFile,
+    suite: Suite,
+}
+
+/// The images of one scene's references.
+pub(super) struct Loaded {
+    pub regions: Regions,
+    pub occluders: Vec<Occluder>,
+    pub on_screen: Option<Shown>,
+    pub rendered: Rendered,
+}
+
+impl Prepared<'_> {
+    /// Renders the references of a plan and writes them into a folder. `work` holds what is
+    /// done, so that an unfinished one can go on.
+    ///
+    /// # Errors
+    /// Where a file cannot be written, or something cannot be rendered; [`RunError::Stopped`] where it was asked to stop.
+    pub fn write_references(
+        &self,
+        means: &Means<'_>,
+        work: &RecordFolder,
+        folder: &Path,
+        observer: &dyn Observer,
+    ) -> Result<(), RunError> {
+        let cost = self.sets.iter().flat_map(|s| all_but_cases(s).into_iter().map(|u| super::step(s, &u).rays)).sum();
+        let progress = Progress::new(observer, cost);
+        let mut scenes = Vec::new();
+        for set in &self.sets {
+            let studio = Studio { set, means, journal: Journal { folder: work }, progress: &progress, until: None };
+            let mut rendered = Rendered::default();
+            studio.render(&all_but_cases(set), 0, &mut rendered)?;
+            if means.stop.is_asked() {
+                return Err(RunError::Stopped);
+            }
+            let name = &set.scene.name;
+            let mut files = vec![(REGIONS.to_owned(), set.subject.masks())];
+            rendered.check(name)?;
+            for unit in all_but_cases(set) {
+                let file = match &unit {
+                    Unit::Judge => JUDGE.to_owned(),
+                    Unit::Converged(m) => converged(&self.plan.suite.methods[*m].name),
+                    Unit::Look | Unit::Case(_) => LOOK.to_owned(),
+                };
+                files.push((file, Layers::read(&work.path().join(journal::file(self.plan, name, &unit)))?));
+            }
+            let mut images = BTreeMap::new();
+            for (file, layers) in files {
+                let path = folder.join(name).join(&file);
+                layers.write(&path)?;
+                images.insert(file, journal::sha256(&path)?);
+            }
+            scenes.push(SceneReferences {
+                facts: set.subject.facts.clone(),
+                occluders: set.subject.occluders.iter().map(|o| o.name.clone()).collect(),
+                screen: set.subject.on_screen.as_ref().map(|s| s.record.clone()),
+                images,
+            });
+        }
+        let file = ReferencesFile {
+            version: VERSION,
+            tool: env!("CARGO_PKG_VERSION").to_owned(),
+            suite: self.plan.suite.name.clone(),
+            file: self.plan.suite.file.clone(),
+            seed: self.plan.seed,
+            scenes,
+        };
+        let path = folder.join(FILE);
+        let text = serde_json::to_string_pretty(&file)
+            .map_err(|e| DiskError::content(&path, format!("the references cannot be written: {e}")))?;
+        Ok(write_whole(&path, |buffer| buffer.write_all(format!("{text}\n").as_bytes()))?)
+    }
+}
+
+/// Judge, converged images and pictures.
+fn all_but_cases<'a>(set: &Set<'a>) -> Vec<Unit<'a>> {
+    set.units().into_iter().filter(|u| !matches!(u, Unit::Case(_))).collect()
+}
+
+impl Rendered {
+    /// Whether references can be made of it.
+    fn check(&self, scene: &str) -> Result<(), RunError> {
+        let judge = self.judge.iter().find_map(|j| j.as_ref().err().cloned());
+        let look = self.look.iter().find_map(|l| l.as_ref().err().cloned());
+        let fault = judge.or(look).or_else(|| self.truths.values().find_map(|t| t.fault.clone()));
+        fault.map_or(Ok(()), |why| Err(RunError::Reference { scene: scene.to_owned(), why }))
+    }
+}
+
+impl Subject<'_> {
+    /// Every region as a mask.
+    fn masks(&self) -> Layers {
+        let pixels = self.facts.pixels();
+        let mut layers = Layers::new(self.facts.resolution);
+        let mut add = |occluder: Option<usize>, shown: bool, regions: &Regions| {
+            for region in Region::ALL {
+                let mask = regions.mask(region, pixels);
+                layers.layers.insert(layer(occluder, shown, region), mask);
+            }
+        };
+        add(None, false, &self.regions);
+        if let Some(shown) = &self.on_screen {
+            add(None, true, &shown.regions);
+        }
+        for (i, occluder) in self.occluders.iter().enumerate() {
+            add(Some(i), false, &occluder.regions);
+            if let Some(shown) = &occluder.shown {
+                add(Some(i), true, shown);
+            }
+        }
+        layers
+    }
+}
+
+impl References {
+    /// Reads the references in a folder, or in the folder `scoring` of a kit. Images are
+    /// read and held against their hashes when they are needed.
+    ///
+    /// # Errors
+    /// Where there are none, or they are malformed or of another version.
+    pub fn read(given: &Path) -> Result<Self, DiskError> {
+        let inside = given.join("scoring");
+        let folder = if given.join(FILE).exists() { given.to_owned() } else { inside };
+        let path = folder.join(FILE);
+        if !path.exists() {
+            let why = format!(
+                "neither it nor the folder 'scoring' in it holds a {FILE}: name the folder that `aogauge scene export \
+                 --suite` wrote"
+            );
+            return Err(DiskError::content(given, why));
+        }
+        let text = read_text(&path)?;
+        #[derive(Deserialize)]
+        struct Versioned {
+            version: u32,
+        }
+        let malformed = |e: serde_json::Error| DiskError::content(&path, format!("not a list of references: {e}"));
+        let Versioned { version } = serde_json::from_str(&text).map_err(malformed)?;
+        if version != VERSION {
+            let why = format!("they are references of version {version}, this tool reads version {VERSION}");
+            return Err(DiskError::content(&path, why));
+        }
+        let file: ReferencesFile = serde_json::from_str(&text).map_err(malformed)?;
+        for scene in &file.scenes {
+            scene.check().map_err(|why| DiskError::content(&path, why))?;
+        }
+        let names: Vec<&str> = file.scenes.iter().map(|s| s.facts.name.as_str()).collect();
+        let label = path.display().to_string();
+        let suite = Suite::without_scenes(&file.suite, &label, file.file.clone(), &names)
+            .map_err(|e| DiskError::content(&path, e.to_string()))?;
+        Ok(References { folder, file, suite })
+    }
+
+    /// The suite, without its scenes' geometry.
+    pub fn suite(&self) -> &Suite {
+        &self.suite
+    }
+
+    /// What the list of references says.
+    pub fn file(&self) -> &ReferencesFile {
+        &self.file
+    }
+
+    /// A scene by name.
+    pub fn scene(&self, name: &str) -> Option<&SceneReferences> {
+        self.file.scenes.iter().find(|s| s.facts.name == name)
+    }
+
+    /// The converged image of a method in a scene; None where the suite lacks either.
+    ///
+    /// # Errors
+    /// Where the image cannot be read or is not the one that the list tells of.
+    pub fn converged(&self, scene: &str, method: &str) -> Result<Option<Converged>, DiskError> {
+        let is_known = self.suite.methods.iter().any(|m| m.name == method);
+        let Some(scene) = self.scene(scene).filter(|_| is_known) else { return Ok(None) };
+        let file = converged(method);
+        let replicates = journal::replicates(&self.layers(scene, &file)?);
+        if replicates.len() != CONVERGED_REPLICATES as usize {
+            let why = format!("it holds {} replicates, not {CONVERGED_REPLICATES}", replicates.len());
+            return Err(DiskError::content(&self.path(scene, &file), why));
+        }
+        Ok(Some(Converged::new(replicates)))
+    }
+
+    /// The pixels of each region of a scene's view.
+    ///
+    /// # Errors
+    /// As [`References::converged`].
+    pub fn regions(&self, scene: &SceneReferences) -> Result<Regions, DiskError> {
+        let layers = self.layers(scene, REGIONS)?;
+        self.masks(scene, &layers, None, false)
+    }
+
+    /// All images of a scene that are measured with.
+    pub(super) fn load(&self, plan: &Plan<'_>, scene: &SceneReferences) -> Result<Loaded, DiskError> {
+        let layers = self.layers(scene, REGIONS)?;
+        let masks = |occluder, shown| self.masks(scene, &layers, occluder, shown);
+        let on_screen = match &scene.screen {
+            Some(record) => Some(Shown { regions: masks(None, true)?, record: record.clone() }),
+            None => None,
+        };
+        let mut occluders = Vec::new();
+        for (i, name) in scene.occluders.iter().enumerate() {
+            let shown = if on_screen.is_some() { Some(masks(Some(i), true)?) } else { None };
+            occluders.push(Occluder { name: name.clone(), regions: masks(Some(i), false)?, shown });
+        }
+        let mut rendered = Rendered { look: Some(Ok(())), ..Rendered::default() };
+        if scene.facts.has_occluder {
+            let pairs = journal::pairs(&self.layers(scene, JUDGE)?);
+            if pairs.len() < 2 {
+                return Err(DiskError::content(&self.path(scene, JUDGE), "it holds fewer than two replicates"));
+            }
+            rendered.judge = Some(Ok(pairs));
+        }
+        for (index, method) in plan.suite.methods.iter().enumerate() {
+            if let Some(converged) = self.converged(&scene.facts.name, &method.name)? {
+                rendered.truths.insert(index, Truth { converged, fault: None });
+            }
+        }
+        Ok(Loaded { regions: masks(None, false)?, occluders, on_screen, rendered })
+    }
+
+    /// The reference pictures from the look view.
+    pub(super) fn look(&self, scene: &SceneReferences) -> Result<Layers, DiskError> {
+        let path = self.path(scene, LOOK);
+        self.sound(scene, LOOK)?;
+        Layers::read(&path)
+    }
+
+    fn path(&self, scene: &SceneReferences, file: &str) -> PathBuf {
+        self.folder.join(&scene.facts.name).join(file)
+    }
+
+    /// Refuses a file that is not the one the list tells of.
+    fn sound(&self, scene: &SceneReferences, file: &str) -> Result<(), DiskError> {
+        let path = self.path(scene, file);
+        let listed =
+            scene.images.get(file).ok_or_else(|| DiskError::content(&path, format!("{FILE} does not list it")))?;
+        if journal::sha256(&path)? != *listed {
+            let why = format!("the image is not the one that {FILE} tells of: it was damaged or replaced");
+            return Err(DiskError::content(&path, why));
+        }
+        Ok(())
+    }
+
+    /// A file of images of the size of the measure view.
+    fn layers(&self, scene: &SceneReferences, file: &str) -> Result<Layers, DiskError> {
+        self.sound(scene, file)?;
+        let path = self.path(scene, file);
+        let layers = Layers::read(&path)?;
+        let ([w, h], [vw, vh]) = (layers.resolution, scene.facts.resolution);
+        if layers.resolution != scene.facts.resolution {
+            return Err(DiskError::content(&path, format!("it is {w} x {h} pixels, the measure view {vw} x {vh}")));
+        }
+        Ok(layers)
+    }
+
+    fn masks(
+        &self,
+        scene: &SceneReferences,
+        layers: &Layers,
+        occluder: Option<usize>,
+        shown: bool,
+    ) -> Result<Regions, DiskError> {
+        let mask = |region| {
+            let name = layer(occluder, shown, region);
+            layers
+                .get(&name)
+                .ok_or_else(|| DiskError::content(&self.path(scene, REGIONS), format!("it lacks '{name}'")))
+        };
+        let mut masks = Vec::new();
+        for region in Region::ALL {
+            masks.push(mask(region)?);
+        }
+        Ok(Regions::of_masks(|region| masks[region as usize]))
+    }
+}
+
+impl SceneReferences {
+    /// Refuses what no tool of ours wrote: names that lead elsewhere, and sizes that do not
+    /// go together.
+    fn check(&self) -> Result<(), String> {
+        let facts = &self.facts;
+        aogauge_scenes::check_name(&facts.name).map_err(|e| format!("scenes: {e}"))?;
+        if let Some(file) = self.images.keys().find(|f| aogauge_scenes::check_name(f).is_err()) {
+            return Err(format!("scene '{}': '{file}' is no name of an image", facts.name));
+        }
+        let [w, h] = facts.resolution;
+        if facts.transect.len() != w as usize || h == 0 || !(facts.radius > 0.0) {
+            return Err(format!("scene '{}': resolution, transect and radius do not go together", facts.name));
+        }
+        let missing = [Some(REGIONS), facts.has_occluder.then_some(JUDGE)];
+        match missing.into_iter().flatten().find(|f| !self.images.contains_key(*f)) {
+            Some(file) => Err(format!("scene '{}': images does not list {file}", facts.name)),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,261 @@
+//! Images that were handed in become a record: measured and judged as those of a run are,
+//! against the references of a kit.
+
+use super::{
+    RunError,
+    case_metrics::{Others, metrics},
+    faults,
+    journal::{case_image, look_image},
+    judging::{Judged, Unjudged},
+    measuring::Counts,
+    references::{References, SceneReferences},
+    rendering::{Images, Rendered, case_layers, moments},
+    set::measured,
+    subject::Subject,
+};
+use crate::{
+    gate::Gate,
+    layers::pixel_hash,
+    metrics::{
+        Absent, Metric, MetricName,
+        artifact::{Converged, Method as Measured},
+        regions::Regions,
+        tiles,
+    },
+    record::{CaseRecord, HandedIn, Intervals, Machine, Record, RecordFolder, Shows, Source},
+    render::Estimator,
+    suite::{Case, Method, Plan, Platform, Suite},
+};
+use std::time::Instant;
+
+/// The images of one case, as they were handed in.
+#[derive(Clone, Debug)]
+pub struct Handed {
+    /// What they are images of.
+    pub case: Case,
+    /// Openness, an image a replicate, of the size of the measure view; or why there is none.
+    pub images: Result<Vec<Vec<f32>>, String>,
+    /// Where they come from; None where there are no files.
+    pub source: Option<Source>,
+}
+
+impl References {
+    /// Measures what was handed in and commits its record. `gates` take the place of the
+    /// suite's.
+    ///
+    /// # Errors
+    /// Where references cannot be read, or a file cannot be written. What is wrong with the images of a case ends that case
+    /// alone.
+    pub fn score(
+        &self,
+        handed: &[Handed],
+        by: HandedIn,
+        gates: Option<Vec<Gate>>,
+        folder: &RecordFolder,
+    ) -> Result<Record, RunError> {
+        let start = Instant::now();
+        let mut suite = self.suite().clone();
+        let foreign = add_foreign(&mut suite, handed);
+        suite.gates = gates.unwrap_or(suite.gates);
+        let in_order = |scene: &SceneReferences| {
+            let own = handed.iter().filter(|h| h.case.scene == scene.facts.name);
+            own.map(|h| h.case.clone()).collect::<Vec<_>>()
+        };
+        let plan = Plan {
+            suite: &suite,
+            cases: self.file().scenes.iter().flat_map(in_order).collect(),
+            seed: self.file().seed,
+            platform: Platform::Cpu,
+            filter: None,
+            until_sure: None,
+            base: None,
+            no_base: true,
+        };
+        let (mut scenes, mut cases) = (Vec::new(), Vec::new());
+        for scene in &self.file().scenes {
+            let own: Vec<&Handed> = handed.iter().filter(|h| h.case.scene == scene.facts.name).collect();
+            if own.is_empty() {
+                continue;
+            }
+            let loaded = self.load(&plan, scene)?;
+            let facts = scene.facts.clone();
+            let mut rendered = loaded.rendered;
+            let (regions, occluders, on_screen) = (loaded.regions, loaded.occluders, loaded.on_screen);
+            let subject = Subject { plan: &plan, facts, regions, occluders, on_screen };
+            let judged = subject.judge(folder, &rendered)?;
+            let scored = Scored { subject: &subject, judged: &judged, handed: &own };
+            for handed in &own {
+                let record = scored.case(handed, &rendered);
+                if let (None, Ok(images)) = (&record.error, &handed.images) {
+                    case_layers(subject.facts.resolution, &handed.case, images, None)
+                        .write(&folder.path().join(case_image(&handed.case)))?;
+                }
+                cases.push(record);
+            }
+            scored.note(&mut rendered);
+            self.look(scene)?.write(&folder.path().join(look_image(&scene.facts.name)))?;
+            scenes.push(subject.scene_record(folder, &rendered, &judged, &Counts::all(u32::MAX))?);
+        }
+        let gpu = format!("none was used: the images were handed in, of the renderer '{}'", by.renderer);
+        let mut info = super::suite_info(&plan);
+        info.methods.retain(|name, _| !foreign.contains(name));
+        let mut timing = super::timing();
+        timing.seconds = start.elapsed().as_secs_f64();
+        let record = super::record(super::Found {
+            plan: &plan,
+            suite: info,
+            machine: Machine::here(gpu, None),
+            timing,
+            end: super::End { incomplete: None, until_sure: None },
+            scenes,
+            cases,
+            handed_in: Some(by),
+        });
+        folder.commit(&record)?;
+        Ok(record)
+    }
+}
+
+/// Adds estimators that the suite does not have: they have no converged image of ours, and
+/// their options are not known.
+fn add_foreign(suite: &mut Suite, handed: &[Handed]) -> Vec<String> {
+    let mut foreign: Vec<String> = Vec::new();
+    for Handed { case, .. } in handed {
+        if !suite.methods.iter().any(|m| m.name == case.estimator) {
+            foreign.push(case.estimator.clone());
+            // With rays of its own, so that it is not taken for the classic one.
+            let rays = Some(aogauge_scenes::Count(case.rays));
+            suite.methods.push(Method { name: case.estimator.clone(), estimator: Estimator::CLASSIC, rays });
+        }
+    }
+    foreign
+}
+
+/// One scene with what was handed in of it.
+struct Scored<'a> {
+    subject: &'a Subject<'a>,
+    judged: &'a Result<Judged, Unjudged>,
+    handed: &'a [&'a Handed],
+}
+
+impl Scored<'_> {
+    fn case(&self, handed: &Handed, rendered: &Rendered) -> CaseRecord {
+        let failed =
+            |why: String| CaseRecord { source: handed.source.clone(), ..CaseRecord::failed(&handed.case, why) };
+        let images = match &handed.images {
+            Ok(images) => images,
+            Err(why) => return failed(why.clone()),
+        };
+        let index = self.subject.method(&handed.case);
+        let shows = handed.source.as_ref().map_or(Shows::Openness, |s| s.shows);
+        let all = self.subject.regions(index);
+        // Where a whole frame without AO is black, the ratio is not known.
+        let known = all.only(|i| shows == Shows::Openness || images.iter().all(|r| r[i as usize].is_finite()));
+        let width = self.subject.facts.resolution[0];
+        for (replicate, image) in (0..).zip(images) {
+            if let Err(e) = faults::check(image, |_| true, &known, replicate, width) {
+                return failed(e.to_string());
+            }
+        }
+        let foreign;
+        let converged = match rendered.truths.get(&index) {
+            Some(truth) => &truth.converged,
+            None => {
+                foreign = Converged::new(images.clone());
+                &foreign
+            }
+        };
+        let measure = |regions: &Regions| self.metrics(handed, shows, regions, converged, rendered);
+        let is_one = handed.source.as_ref().is_some_and(|s| s.intervals == Intervals::Tiles);
+        let metrics =
+            if is_one { tiles::of_one_frame(&known, self.subject.facts.resolution, measure) } else { measure(&known) };
+        let mut record = CaseRecord::failed(&handed.case, String::new());
+        record.error = None;
+        record.image = Some(case_image(&handed.case));
+        record.hash = Some(pixel_hash(&moments(images, self.subject.facts.pixels()).0));
+        record.metrics = metrics;
+        record.replicates = Some(images.len() as u32);
+        record.source = handed.source.clone();
+        if shows == Shows::Openness && !is_one {
+            let method = measured(images, converged, &known);
+            let classic = self.classic(&handed.case, images.len());
+            let classic_on =
+                |regions| Some(measured(classic?.images.as_ref().ok()?, self.classic_truth(rendered)?, regions));
+            record.occluders = self.subject.by_occluder(index, &method, &classic_on, self.judged);
+        }
+        record
+    }
+
+    /// Every metric over some regions.
+    fn metrics(
+        &self,
+        handed: &Handed,
+        shows: Shows,
+        regions: &Regions,
+        converged: &Converged,
+        rendered: &Rendered,
+    ) -> Vec<Metric> {
+        let Ok(images) = &handed.images else { return Vec::new() };
+        let case = &handed.case;
+        let method = measured(images, converged, regions);
+        if shows == Shows::Frame {
+            return method.contrasts().to_vec();
+        }
+        let index = self.subject.method(case);
+        let is_classic = self.subject.plan.suite.methods[self.subject.plan.suite.classic()].name == case.estimator;
+        let classic = self.classic(case, images.len()).filter(|_| !is_classic);
+        let beside = classic.zip(self.classic_truth(rendered)).and_then(|(classic, truth)| {
+            Some(Measured { replicates: classic.images.as_ref().ok()?, converged: truth, regions })
+        });
+        let lacks_classic = beside.is_none() && !is_classic;
+        let others = Others {
+            classic: beside,
+            cpu: None,
+            judge: self.subject.judge_of(index, self.judged),
+            image: self.judged.as_ref().map_err(Unjudged::absent).and_then(Judged::image),
+            occluder: self.subject.facts.has_occluder,
+        };
+        let mut metrics = metrics(&method, &others);
+        if lacks_classic && self.subject.facts.has_occluder {
+            let why = "as many images of classic AO of this renderer were not handed in";
+            metrics.push(Metric::new(MetricName::Removed, None, Err(Absent(why.to_owned()))));
+        }
+        if !rendered.truths.contains_key(&index) {
+            let why = format!("the suite has no estimator '{}', so there is no converged image of it", case.estimator);
+            for m in &mut metrics {
+                if matches!(m.name, MetricName::Bias | MetricName::Mae | MetricName::Rmse) {
+                    *m = Metric::new(m.name, m.region, Err(Absent(why.clone())));
+                }
+            }
+        }
+        metrics
+    }
+
+    /// The images of classic AO that a case is compared with: as many, of the same renderer;
+    /// of as many rays, else of the most.
+    fn classic(&self, case: &Case, replicates: usize) -> Option<&Handed> {
+        let classic = &self.subject.plan.suite.methods[self.subject.plan.suite.classic()].name;
+        let is_openness = |h: &&&Handed| h.source.as_ref().is_none_or(|s| s.shows == Shows::Openness);
+        let theirs = self.handed.iter().filter(|h| h.case.estimator == *classic).filter(is_openness);
+        let as_many = theirs.filter(|h| h.images.as_ref().is_ok_and(|i| i.len() == replicates));
+        as_many.max_by_key(|h| (h.case.rays == case.rays, h.case.rays)).copied()
+    }
+
+    fn classic_truth<'r>(&self, rendered: &'r Rendered) -> Option<&'r Converged> {
+        rendered.truths.get(&self.subject.plan.suite.classic()).map(|t| &t.converged)
+    }
+
+    /// Puts images of openness where profiles and convergence are taken from.
+    fn note(&self, rendered: &mut Rendered) {
+        for handed in self.handed {
+            let shows = handed.source.as_ref().map_or(Shows::Openness, |s| s.shows);
+            if let (Ok(replicates), Shows::Openness) = (&handed.images, shows) {
+                let images = Images { replicates: replicates.clone(), hash: String::new(), seconds: 0.0 };
+                rendered.images.insert(handed.case.id(), Ok(images));
+            }
+        }
+        // For methods that nobody handed in, nothing is told.
+        let methods = self.subject.plan.methods();
+        rendered.truths.retain(|m, _| methods.contains(m));
+    }
+}
