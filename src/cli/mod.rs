@@ -128,13 +128,13 @@ macro_rules! usage {
         }
     )*};
 }
-usage!(DiskError, crate::kit::KitError, crate::preview::PreviewError, ReportError, SceneError, SuiteError);
+usage!(DiskError, crate::preview::PreviewError, ReportError, SceneError, SuiteError);
 
 impl From<RunError> for Failure {
     fn from(e: RunError) -> Self {
         let exit = match e {
             // It began well and could not go on.
-            RunError::Disk(_) => Exit::Incomplete,
+            RunError::Disk(_) | RunError::Stopped => Exit::Incomplete,
             _ => Exit::Usage,
         };
         Failure { exit, message: e.to_string() }

@@ -1,7 +1,7 @@
 //! `aogauge run`
 
 mod dry_run;
-mod interrupt;
+pub(super) mod interrupt;
 
 use super::{
     Exit, Failure, Format, json,

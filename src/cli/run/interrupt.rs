@@ -7,7 +7,7 @@ use crate::{
 
 /// The first one ends the run in good order, the second at once. What is done is kept either
 /// way.
-pub(super) fn listen(stop: &Stop) {
+pub(in crate::cli) fn listen(stop: &Stop) {
     let stop = stop.clone();
     let handler = move || {
         if stop.is_asked() {

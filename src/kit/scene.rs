@@ -19,6 +19,9 @@ pub enum KitError {
     /// The scene file cannot be made.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// What images are scored against cannot be made.
+    #[error(transparent)]
+    Run(#[from] crate::run::RunError),
     /// The scene cannot be traced.
     #[error("scene '{scene}': {source}")]
     Render {

@@ -1,0 +1,10 @@
+//! Scenes packed for renderers of others: one alone, or those of a suite with all that the
+//! images are scored against.
+
+mod manifest;
+mod scene;
+mod suite;
+
+pub use manifest::{Manifest, ManifestScene};
+pub use scene::{KitError, write};
+pub use suite::{SCENES, SCORING, write_suite};
