@@ -11,7 +11,7 @@ use crate::{
     run::{Means, Observer, Prepared, References},
     suite::Suite,
 };
-use minijinja::{Environment, Error, Serde, syntax::SyntaxConfig};
+use minijinja::{Environment, Error, syntax::SyntaxConfig, value::Serde};
 use std::{fs, io::Write, path::Path};
 
 /// The folder of the scenes.
