@@ -31,7 +31,7 @@ mod until_sure;
 pub use error::RunError;
 pub use merge::{MergeError, Shards, find as find_shards};
 pub use progress::Observer;
-pub use references::{References, ReferencesFile, SceneReferences};
+pub use references::{References, ReferencesError, ReferencesFile, SceneReferences};
 pub use scoring::Handed;
 pub use shard::{Shard, ShardRecord};
 pub use stop::Stop;

@@ -21,7 +21,7 @@ use crate::{
         regions::{Region, Regions},
     },
     record::{RecordFolder, ScreenRecord},
-    suite::{Plan, Suite, SuiteFile},
+    suite::{Plan, Suite, SuiteError},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -33,6 +33,9 @@ use std::{
 
 /// Version of the format, as it is written and read.
 pub const VERSION: u32 = 1;
+
+/// The suite: its gates may be edited, nothing else.
+pub const SUITE: &str = "suite.toml";
 
 /// The file that makes a folder one of references. It is written last.
 pub const FILE: &str = "scoring.json";
@@ -47,8 +50,6 @@ pub struct ReferencesFile {
     pub tool: String,
     /// Name of the suite.
     pub suite: String,
-    /// The suite as it was written.
-    pub file: SuiteFile,
     /// Seed of the judge and the converged images.
     pub seed: u32,
     /// The scenes, in the suite's order.
@@ -83,6 +84,17 @@ fn layer(occluder: Option<usize>, shown: bool, region: Region) -> String {
     let of = occluder.map_or_else(|| "region".to_owned(), |i| format!("occluder-{i:03}"));
     let shown = if shown { "-shown" } else { "" };
     format!("{of}{shown}-{}", region.label())
+}
+
+/// Why references cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ReferencesError {
+    /// There are none, or they are malformed or of another version.
+    #[error(transparent)]
+    Disk(#[from] DiskError),
+    /// Their suite is.
+    #[error(transparent)]
+    Suite(#[from] SuiteError),
 }
 
 /// References as they were read.
@@ -152,10 +164,13 @@ impl Prepared<'_> {
             version: VERSION,
             tool: env!("CARGO_PKG_VERSION").to_owned(),
             suite: self.plan.suite.name.clone(),
-            file: self.plan.suite.file.clone(),
             seed: self.plan.seed,
             scenes,
         };
+        let path = folder.join(SUITE);
+        let text = toml::to_string_pretty(&self.plan.suite.file)
+            .map_err(|e| DiskError::content(&path, format!("the suite cannot be written: {e}")))?;
+        write_whole(&path, |buffer| buffer.write_all(text.as_bytes()))?;
         let path = folder.join(FILE);
         let text = serde_json::to_string_pretty(&file)
             .map_err(|e| DiskError::content(&path, format!("the references cannot be written: {e}")))?;
@@ -209,7 +224,7 @@ impl References {
     ///
     /// # Errors
     /// Where there are none, or they are malformed or of another version.
-    pub fn read(given: &Path) -> Result<Self, DiskError> {
+    pub fn read(given: &Path) -> Result<Self, ReferencesError> {
         let inside = given.join("scoring");
         let folder = if given.join(FILE).exists() { given.to_owned() } else { inside };
         let path = folder.join(FILE);
@@ -218,7 +233,7 @@ impl References {
                 "neither it nor the folder 'scoring' in it holds a {FILE}: name the folder that `aogauge scene export \
                  --suite` wrote"
             );
-            return Err(DiskError::content(given, why));
+            return Err(DiskError::content(given, why).into());
         }
         let text = read_text(&path)?;
         #[derive(Deserialize)]
@@ -229,16 +244,15 @@ impl References {
         let Versioned { version } = serde_json::from_str(&text).map_err(malformed)?;
         if version != VERSION {
             let why = format!("they are references of version {version}, this tool reads version {VERSION}");
-            return Err(DiskError::content(&path, why));
+            return Err(DiskError::content(&path, why).into());
         }
         let file: ReferencesFile = serde_json::from_str(&text).map_err(malformed)?;
         for scene in &file.scenes {
             scene.check().map_err(|why| DiskError::content(&path, why))?;
         }
         let names: Vec<&str> = file.scenes.iter().map(|s| s.facts.name.as_str()).collect();
-        let label = path.display().to_string();
-        let suite = Suite::without_scenes(&file.suite, &label, file.file.clone(), &names)
-            .map_err(|e| DiskError::content(&path, e.to_string()))?;
+        let path = folder.join(SUITE);
+        let suite = Suite::without_scenes(&file.suite, &path.display().to_string(), &read_text(&path)?, &names)?;
         Ok(References { folder, file, suite })
     }
 

@@ -150,14 +150,16 @@ impl Suite {
         Ok(Suite { name, file: parsed, scenes, methods, gates })
     }
 
-    /// A suite whose scenes are known by name only: enough to measure and to judge, not to
-    /// render. `label` is what errors call the file it comes from.
+    /// A suite from TOML whose scenes are known by name only: enough to measure and to judge, not to
+    /// render. `label` is what errors call the file.
     ///
     /// # Errors
-    /// [`SuiteError::Invalid`], which names the field.
-    pub fn without_scenes(name: &str, label: &str, file: SuiteFile, scenes: &[&str]) -> Result<Self, SuiteError> {
-        let (methods, gates) =
-            checked(&file, scenes).map_err(|message| SuiteError::Invalid { file: label.to_owned(), message })?;
+    /// [`SuiteError`], which names the line or field.
+    pub fn without_scenes(name: &str, label: &str, text: &str, scenes: &[&str]) -> Result<Self, SuiteError> {
+        let toml = |e| SuiteError::Toml { file: label.to_owned(), source: Box::new(e) };
+        let file: SuiteFile = toml::from_str(text).map_err(toml)?;
+        let invalid = |message| SuiteError::Invalid { file: label.to_owned(), message };
+        let (methods, gates) = checked(&file, scenes).map_err(invalid)?;
         Ok(Suite { name: name.to_owned(), file, scenes: Vec::new(), methods, gates })
     }
 
