@@ -1,12 +1,30 @@
-//! Images of renderers that are not ours: what is declared of them ([`Declared`]), how
-//! one file becomes openness ([`read`]).
+//! Images of renderers that are not ours: which files are images of what ([`files`]), what
+//! is declared of them ([`Declared`]), how one becomes openness ([`read`], [`ratio`]), what
+//! is wrong with it ([`diagnose`]), and which curve it was sent through ([`fit_curve`]).
 
+mod curve;
 mod declared;
+mod detect;
+mod diagnose;
+mod files;
+mod name;
+mod ratio;
 mod read;
 mod upsample;
 
+pub use curve::{Curve, fit_curve};
 pub use declared::{Declared, Means, Rows, Share, Upsample};
+pub use detect::read_against;
+pub use diagnose::{FACTORS, Finding, Reference, Scaled, Turn, alike, diagnose};
+pub use files::{Defaults, Files, Handed, HandedImage, files};
+pub use name::Shown;
+pub use ratio::{Frame, LONE_FRAME, Ratio, frame, ratio};
 pub use read::{Taken, read};
+
+/// A scene of no suite, by whose picture a renderer shows that it holds its images the right
+/// way, saves them linear, and takes R in metres: a scene file. It has no occluder, is like none of its
+/// mirror images, and differs with R from a hundredth to ten times.
+pub const SELF_CHECK: &str = include_str!("self-check.toml");
 
 use crate::disk::DiskError;
 use std::path::PathBuf;
@@ -50,6 +68,17 @@ pub enum IntakeError {
         /// Column and row in the file of the first pixel that is coloured.
         first: [usize; 2],
     },
+    /// Files contradict each other.
+    #[error("{folder}: {what}")]
+    Files {
+        /// The folder that was handed in.
+        folder: PathBuf,
+        /// What is wrong, with the names of the files.
+        what: String,
+    },
+    /// Two whole frames cannot be divided.
+    #[error("the frames with and without AO cannot be divided: {0}")]
+    Ratio(String),
     /// Pixels that see a surface hold no number.
     #[error(
         "{path}: {count} pixels that see a surface hold NaN or infinity, the first at column {}, row {} of the view; \

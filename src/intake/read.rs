@@ -130,7 +130,7 @@ pub(super) fn digits(text: &str) -> Option<u64> {
 }
 
 /// What is odd about an image beside its numbers.
-fn remarks(found: &Found, warnings: &mut Vec<String>) {
+pub(super) fn remarks(found: &Found, warnings: &mut Vec<String>) {
     if found.alpha == Alpha::Varied {
         warnings.push("alpha is not 1 everywhere; it is left out".to_owned());
     }
@@ -140,7 +140,7 @@ fn remarks(found: &Found, warnings: &mut Vec<String>) {
     }
 }
 
-fn check_size(path: &Path, found: [usize; 2], share: Share, view: [u32; 2]) -> Result<(), IntakeError> {
+pub(super) fn check_size(path: &Path, found: [usize; 2], share: Share, view: [u32; 2]) -> Result<(), IntakeError> {
     if share.suits(found, view) {
         return Ok(());
     }

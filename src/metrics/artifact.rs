@@ -127,7 +127,11 @@ impl Method<'_> {
     /// What is removed, and the same as if the judge alone had an error.
     fn removed_estimates(&self, classic: &Method<'_>, judge: &JudgedRegions) -> Result<[Estimate; 2], Absent> {
         let error = classic.contrast_error(Ok(judge));
-        let clear = error.estimate().is_some_and(|e| e.interval(0.95)[0] > 0.0);
+        // One image alone has no error of its own: there the judge's has to do.
+        let of_judge = error.floor.map(|f| Estimate { value: 0.0, se: f.se, df: f.df });
+        let alone = of_judge.filter(|_| classic.replicates.len() == 1).zip(error.value);
+        let known = alone.map(|(judge, value)| Estimate { value, ..judge }).or(error.estimate());
+        let clear = known.is_some_and(|e| e.interval(0.95)[0] > 0.0);
         if !clear {
             return Err(Absent("classic shows no false highlight here, so there is nothing to remove".into()));
         }
@@ -144,7 +148,7 @@ impl Method<'_> {
 }
 
 /// How a contrast error reads, where its 95 % interval leaves out zero.
-fn reading(error: &Estimate, judge: f64) -> Option<&'static str> {
+pub(super) fn reading(error: &Estimate, judge: f64) -> Option<&'static str> {
     let [lo, hi] = error.interval(0.95);
     match (lo > 0.0, hi < 0.0, judge > 0.0) {
         (true, _, false) => Some("false highlight"),

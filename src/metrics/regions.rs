@@ -68,6 +68,12 @@ impl Regions {
         Regions { pixels: Region::ALL.map(pixels) }
     }
 
+    /// Regions of these pixels, in the order of [`Region::ALL`]; a pixel may come several
+    /// times, and counts as often.
+    pub(super) fn of_pixels(pixels: [Vec<u32>; 5]) -> Self {
+        Regions { pixels }
+    }
+
     /// The same regions without the pixels that `keep` refuses.
     #[must_use]
     pub fn only(&self, keep: impl Fn(u32) -> bool) -> Regions {

@@ -165,10 +165,17 @@ impl Scored<'_> {
                 &foreign
             }
         };
-        let measure = |regions: &Regions| self.metrics(handed, shows, regions, converged, rendered);
+        let measure =
+            |images: &[Vec<f32>], regions: &Regions| self.metrics(handed, shows, images, regions, converged, rendered);
         let is_one = handed.source.as_ref().is_some_and(|s| s.intervals == Intervals::Tiles);
-        let metrics =
-            if is_one { tiles::of_one_frame(&known, self.subject.facts.resolution, measure) } else { measure(&known) };
+        let metrics = match images.as_slice() {
+            [one] if is_one => {
+                let center = rendered.truths.get(&index).filter(|_| shows != Shows::Frame);
+                let center = center.map(|t| t.converged.mean.as_slice());
+                tiles::of_one_frame(one, center, &known, self.subject.facts.resolution, measure)
+            }
+            _ => measure(images, &known),
+        };
         let mut record = CaseRecord::failed(&handed.case, String::new());
         record.error = None;
         record.image = Some(case_image(&handed.case));
@@ -191,11 +198,11 @@ impl Scored<'_> {
         &self,
         handed: &Handed,
         shows: Shows,
+        images: &[Vec<f32>],
         regions: &Regions,
         converged: &Converged,
         rendered: &Rendered,
     ) -> Vec<Metric> {
-        let Ok(images) = &handed.images else { return Vec::new() };
         let case = &handed.case;
         let method = measured(images, converged, regions);
         if shows == Shows::Frame {

@@ -1,0 +1,110 @@
+//! What the numbers of an image that lies as it should mean: openness, its codes, openness
+//! through a curve, or openness of another R.
+
+use super::{Finding, Reference, Scaled, samples::square};
+use crate::{intake::Curve, layers::linear};
+
+/// Root mean square, noise taken away, from which on a difference is looked into.
+const DIFFERENT: f64 = 0.015;
+/// What is left of the mean square difference under a hypothesis that is taken: a quarter,
+/// half as far.
+const LEFT: f64 = 0.25;
+/// A curve has two free numbers and may bend one estimator into another: it must leave
+/// less, a fifth as far...
+const LEFT_BY_CURVE: f64 = 0.04;
+/// ... and be a curve worth the name: exponent or gain so many times more or less than 1.
+const CURVED: f64 = 1.25;
+const GAINED: f64 = 1.15;
+/// Standard errors between two hypotheses that are told from each other.
+const SURE: f64 = 4.0;
+/// sRGB is near the power 1/2.2; powers in this range are an encoding for display.
+const DISPLAY: [f64; 2] = [1.0 / 2.7, 1.0 / 1.7];
+
+struct Hypothesis {
+    finding: Finding,
+    /// Mean square of what it leaves, and its error.
+    left: [f64; 2],
+    /// How much it must leave at most, of what is there without it.
+    most: f64,
+}
+
+/// What explains how an image differs from the reference, if anything does.
+pub(super) fn find(image: &[f32], reference: &Reference, width: usize) -> Option<Finding> {
+    let without = left(image, &reference.openness, width);
+    if without[0] < DIFFERENT * DIFFERENT + SURE * without[1] {
+        return None;
+    }
+    let hypotheses = values(image, reference, width).into_iter().chain(scales(image, reference, width));
+    let explains = |h: &Hypothesis| {
+        let error = without[1].hypot(h.left[1]);
+        h.left[0] < h.most * without[0] + h.left[1] && without[0] - h.left[0] > SURE * error
+    };
+    let best = hypotheses.filter(explains).reduce(|a, b| if b.left[0] < a.left[0] { b } else { a })?;
+    Some(match best.finding {
+        Finding::Scaled { factors } => same_scales(image, reference, width, &factors),
+        other => other,
+    })
+}
+
+/// The image as it would be without what was found.
+pub(super) fn undone(finding: &Finding, image: &[f32]) -> Option<Vec<f32>> {
+    let curve = match *finding {
+        Finding::Encoded { gamma: None } => return Some(image.iter().map(|v| linear(*v)).collect()),
+        Finding::Encoded { gamma: Some(gamma) } => Curve { exponent: 1.0 / gamma, ..Curve::IDENTITY },
+        Finding::Curve { gain, exponent } => Curve { gain, exponent, ..Curve::IDENTITY },
+        _ => return None,
+    };
+    Some(curve.undo(image))
+}
+
+/// The mean square of image less reference, without noise, and its error.
+pub(super) fn left(image: &[f32], reference: &[f32], width: usize) -> [f64; 2] {
+    square(&image.iter().zip(reference).map(|(a, b)| a - b).collect::<Vec<_>>(), width)
+}
+
+/// The image as codes, and through a curve. Codes come first: they have no free number.
+fn values(image: &[f32], reference: &Reference, width: usize) -> Vec<Hypothesis> {
+    let left_by = |finding: &Finding| undone(finding, image).map(|u| left(&u, &reference.openness, width));
+    let srgb = Finding::Encoded { gamma: None };
+    let mut found = Vec::new();
+    if let Some(left) = left_by(&srgb) {
+        found.push(Hypothesis { finding: srgb, left, most: LEFT });
+    }
+    let Some(curve) = Curve::fit(&[(image, reference.openness.as_slice())]) else { return found };
+    let (gain, exponent) = (curve.gain, curve.exponent);
+    let apart = |v: f64| v.max(1.0 / v);
+    if apart(exponent) < CURVED && apart(gain) < GAINED {
+        return found;
+    }
+    let is_display = (DISPLAY[0]..DISPLAY[1]).contains(&exponent) && (0.95..1.05).contains(&gain);
+    let finding =
+        if is_display { Finding::Encoded { gamma: Some(1.0 / exponent) } } else { Finding::Curve { gain, exponent } };
+    let Some(left) = left_by(&finding) else { return found };
+    // What the sRGB curve explains nearly as well is that.
+    let is_srgb = is_display && found.iter().any(|h| h.left[0] < 2.0 * left[0] + 1e-5 + SURE * left[1]);
+    if !is_srgb {
+        found.push(Hypothesis { finding, left, most: LEFT_BY_CURVE });
+    }
+    found
+}
+
+fn scales<'a>(image: &'a [f32], reference: &'a Reference, width: usize) -> impl Iterator<Item = Hypothesis> + 'a {
+    let usable = reference.scaled.iter().filter(|s| s.openness.len() == image.len());
+    usable.map(move |Scaled { factor, openness }| Hypothesis {
+        finding: Finding::Scaled { factors: vec![*factor] },
+        left: left(image, openness, width),
+        most: LEFT,
+    })
+}
+
+/// All factors that the scene looks the same with as with the best of them, which comes first.
+fn same_scales(image: &[f32], reference: &Reference, width: usize, best: &[f64]) -> Finding {
+    let of = |factor: f64| reference.scaled.iter().find(|s| s.factor == factor).map(|s| &s.openness);
+    let chosen = best.first().and_then(|f| of(*f));
+    let is_same = |s: &&Scaled| {
+        let [apart, _] = chosen.map_or([f64::INFINITY; 2], |c| left(c, &s.openness, width));
+        apart < DIFFERENT * DIFFERENT && s.openness.len() == image.len()
+    };
+    let others = reference.scaled.iter().filter(is_same).map(|s| s.factor).filter(|f| !best.contains(f));
+    Finding::Scaled { factors: best.iter().copied().chain(others).collect() }
+}

@@ -1,0 +1,278 @@
+//! Each fault on its own, with noise of 4 rays and of 1 ray; and none where there is none.
+
+use super::*;
+use crate::{
+    intake::{Curve, SELF_CHECK},
+    metrics::regions::Regions,
+    render::{Estimator, Falloff, Geometry, Job, Openness, ReceiverPlane, Renderer, cpu::Cpu, gbuffer::GBuffer},
+    scenes::{AoScale, Scene, library},
+};
+use std::sync::LazyLock;
+
+/// A scene with what images of it are held against.
+struct Bench {
+    scene: Scene,
+    geometry: Geometry,
+    reference: Reference,
+    size: [usize; 2],
+}
+
+impl Bench {
+    fn new(scene: Scene, factors: &[f64]) -> Self {
+        let geometry = Geometry::new(&scene).unwrap();
+        let size = scene.measure.resolution.map(|side| side as usize);
+        let mut bench = Bench { scene, geometry, reference: Reference::default(), size };
+        let openness = bench.render(Estimator::CLASSIC, 1.0, 256, [0.0; 2]);
+        let scaled = |&factor| Scaled { factor, openness: bench.render(Estimator::CLASSIC, factor, 64, [0.0; 2]) };
+        let scaled = factors.iter().map(scaled).collect();
+        bench.reference = Reference { openness, scaled };
+        bench
+    }
+
+    fn library(name: &str) -> Self {
+        Bench::new(library::scene(name).unwrap(), &[0.5, 2.0])
+    }
+
+    fn render(&self, estimator: Estimator, factor: f64, rays: u32, moved: [f32; 2]) -> Vec<f32> {
+        let AoScale { radius, secondary_radius } = self.scene.ao;
+        let ao = AoScale { radius: radius * factor as f32, secondary_radius: secondary_radius * factor as f32 };
+        let view = self.scene.measure.view().moved(moved);
+        let job = Job { view: &view, camera: None, estimator, ao, rays, seed: 7, replicate: 0 };
+        Cpu.load(&self.geometry).unwrap().render(&job).unwrap().values
+    }
+
+    fn classic(&self, rays: u32) -> Vec<f32> {
+        self.render(Estimator::CLASSIC, 1.0, rays, [0.0; 2])
+    }
+
+    fn diagnose(&self, image: &[f32]) -> Vec<Finding> {
+        diagnose(image, &self.reference, self.size)
+    }
+}
+
+static SELF: LazyLock<Bench> = LazyLock::new(|| Bench::new(self_check(), &FACTORS));
+
+fn self_check() -> Scene {
+    Scene::from_toml("self-check", "self-check.toml", SELF_CHECK, None).unwrap()
+}
+
+const NOISES: [u32; 3] = [64, 4, 1];
+
+fn estimators() -> Vec<(&'static str, Estimator)> {
+    let with = |o: Openness| Estimator::Openness(o);
+    vec![
+        ("classic", Estimator::CLASSIC),
+        ("extended", Estimator::extended(ReceiverPlane::Counts)),
+        ("extended-clipped", Estimator::extended(ReceiverPlane::Clipped)),
+        ("obscurance", with(Openness::plain(Falloff::Exponential { extinction: 8.0 }))),
+        ("quadratic", with(Openness::plain(Falloff::Quadratic))),
+    ]
+}
+
+#[test]
+fn correct_images_have_no_findings() {
+    for rays in NOISES {
+        assert_eq!(SELF.diagnose(&SELF.classic(rays)), [], "{rays} rays");
+    }
+    for name in ["curtain-arcade", "corner", "plane", "sphere", "leaves"] {
+        let bench = Bench::library(name);
+        for rays in NOISES {
+            assert_eq!(bench.diagnose(&bench.classic(rays)), [], "{name}, {rays} rays");
+        }
+    }
+}
+
+/// Held against the classic image, when nobody says that they are of another estimator.
+#[test]
+fn other_estimators_have_no_findings() {
+    let benches = [Bench::library("curtain-arcade"), Bench::library("corner")];
+    for bench in benches.iter().chain([&*SELF]) {
+        for (name, estimator) in estimators() {
+            for rays in NOISES {
+                let image = bench.render(estimator, 1.0, rays, [0.0; 2]);
+                assert_eq!(bench.diagnose(&image), [], "{name} of {}, {rays} rays", bench.scene.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn mirrored_and_turned_images_are_told() {
+    for rays in NOISES {
+        for turn in [Turn::FlippedY, Turn::FlippedX, Turn::Half] {
+            let image = turn.of(&SELF.classic(rays), SELF.size);
+            assert_eq!(SELF.diagnose(&image), [Finding::Turned(turn)], "{rays} rays");
+        }
+    }
+    // Quarters have a view of their own size only where it is square.
+    let mut scene = self_check();
+    scene.measure.resolution = [120, 120];
+    let square = Bench::new(scene, &[]);
+    for rays in NOISES {
+        for turn in [Turn::Quarter, Turn::ThreeQuarters, Turn::Transposed, Turn::Antitransposed] {
+            let image = turn.of(&square.classic(rays), square.size);
+            assert_eq!(square.diagnose(&image), [Finding::Turned(turn)], "{rays} rays");
+        }
+    }
+}
+
+#[test]
+fn turns_are_what_they_say() {
+    // 0 1
+    // 2 3, turned clockwise: 2 0 over 3 1.
+    let picture = [0.0, 1.0, 2.0, 3.0];
+    for (turn, expected) in [
+        (Turn::FlippedY, [2.0, 3.0, 0.0, 1.0]),
+        (Turn::FlippedX, [1.0, 0.0, 3.0, 2.0]),
+        (Turn::Half, [3.0, 2.0, 1.0, 0.0]),
+        (Turn::Quarter, [2.0, 0.0, 3.0, 1.0]),
+        (Turn::ThreeQuarters, [1.0, 3.0, 0.0, 2.0]),
+        (Turn::Transposed, [0.0, 2.0, 1.0, 3.0]),
+        (Turn::Antitransposed, [3.0, 1.0, 2.0, 0.0]),
+    ] {
+        assert_eq!(turn.of(&picture, [2, 2]), expected, "{turn:?}");
+        assert_eq!(turn.undone(&expected, [2, 2]), picture, "{turn:?}");
+    }
+}
+
+#[test]
+fn inverted_images_are_told() {
+    let flat = Bench::library("plane");
+    for bench in [&*SELF, &Bench::library("corner"), &flat] {
+        for rays in NOISES {
+            let image: Vec<f32> = bench.classic(rays).iter().map(|v| 1.0 - v).collect();
+            assert_eq!(bench.diagnose(&image), [Finding::Inverted], "{}, {rays} rays", bench.scene.name);
+        }
+    }
+}
+
+fn encode(v: f32) -> f32 {
+    if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Of 1 ray every pixel is 0 or 1, and no curve changes that.
+#[test]
+fn codes_for_display_are_told() {
+    for bench in [&*SELF, &Bench::library("corner")] {
+        for rays in [64, 4] {
+            let image: Vec<f32> = bench.classic(rays).into_iter().map(encode).collect();
+            assert_eq!(bench.diagnose(&image), [Finding::Encoded { gamma: None }], "{}, {rays}", bench.scene.name);
+        }
+    }
+    let image: Vec<f32> = SELF.classic(16).iter().map(|v| v.powf(1.0 / 1.8)).collect();
+    let found = SELF.diagnose(&image);
+    assert!(matches!(found[..], [Finding::Encoded { gamma: Some(g) }] if (g - 1.8).abs() < 0.1), "{found:?}");
+    assert_eq!(SELF.diagnose(&SELF.classic(1).into_iter().map(encode).collect::<Vec<_>>()), []);
+}
+
+#[test]
+fn intensity_is_told_as_a_curve() {
+    for rays in [64, 4] {
+        for (gain, exponent) in [(1.0, 2.0), (1.0, 1.5), (0.7, 1.0), (1.2, 0.8)] {
+            let curve = Curve { gain, exponent, ..Curve::IDENTITY };
+            let found = SELF.diagnose(&curve.apply(&SELF.classic(rays)));
+            let is = |g: f64, e: f64| (g / gain - 1.0).abs() < 0.03 && (e / exponent - 1.0).abs() < 0.06;
+            assert!(
+                matches!(found[..], [Finding::Curve { gain, exponent }] if is(gain, exponent)),
+                "{gain}, {exponent}, {rays} rays: {found:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn scaled_scenes_are_told_with_their_factor() {
+    for rays in NOISES {
+        for factor in FACTORS {
+            let found = SELF.diagnose(&SELF.render(Estimator::CLASSIC, factor, rays, [0.0; 2]));
+            let [Finding::Scaled { factors }] = &found[..] else { panic!("{factor}, {rays} rays: {found:?}") };
+            assert!(factors.contains(&factor), "{factor}, {rays} rays: {found:?}");
+            // All that lies beyond ten times R is the sky.
+            let alone = if factor < 5.0 { factors.len() == 1 } else { factors.iter().all(|f| *f > 5.0) };
+            assert!(alone, "{factor}, {rays} rays: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn shifted_images_are_told_by_how_much() {
+    for rays in NOISES {
+        let moved = |by: [f32; 2]| SELF.render(Estimator::CLASSIC, 1.0, rays, by);
+        // What the view is moved by, the image moves the other way.
+        for by in [[0.5, 0.0], [0.0, -0.5], [1.0, 0.0], [-1.0, 1.0], [0.5, 0.5], [0.0, 2.0]] {
+            let expected = by.map(|v| -f64::from(v) + 0.0);
+            assert_eq!(SELF.diagnose(&moved(by)), [Finding::Shifted { pixels: expected }], "{rays} rays");
+        }
+        for by in [[0.1, 0.0], [0.0, 0.1]] {
+            assert_eq!(SELF.diagnose(&moved(by)), [], "a tenth of a pixel, {rays} rays");
+        }
+    }
+}
+
+#[test]
+fn holes_constants_sizes_and_other_pictures_are_told() {
+    for rays in NOISES {
+        let mut image = SELF.classic(rays);
+        (image[163], image[500]) = (f32::NAN, f32::NEG_INFINITY);
+        assert_eq!(SELF.diagnose(&image), [Finding::Holes { count: 2, first: [3, 1] }]);
+        let noise = Bench::library("leaves").classic(rays);
+        let other: Vec<f32> = (0..image.len()).map(|i| noise[i % noise.len()]).collect();
+        let found = SELF.diagnose(&other);
+        assert!(matches!(found[..], [Finding::Unlike { .. }]), "{rays} rays: {found:?}");
+    }
+    let pixels = SELF.reference.openness.len();
+    for value in [0.0, 0.5, 1.0] {
+        assert_eq!(SELF.diagnose(&vec![value; pixels]), [Finding::Constant { value }]);
+    }
+    let holes = vec![f32::NAN; pixels];
+    assert_eq!(SELF.diagnose(&holes), [Finding::Holes { count: pixels, first: [0, 0] }]);
+    assert_eq!(SELF.diagnose(&holes[1..]), [Finding::Size { found: pixels - 1, expected: pixels }]);
+    assert_eq!(diagnose(&[], &Reference::default(), [0, 0]), [Finding::Size { found: 0, expected: 0 }]);
+    let odd = Reference { scaled: vec![Scaled { factor: 2.0, openness: vec![0.5] }], ..SELF.reference.clone() };
+    assert_eq!(diagnose(&SELF.classic(16), &odd, SELF.size), []);
+    assert_eq!(diagnose(&SELF.classic(16), &SELF.reference, [usize::MAX, 2]).len(), 1);
+}
+
+/// Two faults at once are both told, and each has a remedy.
+#[test]
+fn faults_are_told_together() {
+    let image: Vec<f32> = Turn::FlippedY.of(&SELF.classic(4), SELF.size).iter().map(|v| 1.0 - v).collect();
+    let found = SELF.diagnose(&image);
+    assert_eq!(found, [Finding::Turned(Turn::FlippedY), Finding::Inverted]);
+    let text = found[0].to_string();
+    assert!(text.starts_with("flipped in y") && text.ends_with("save the rows from the top"), "{text}");
+    let image: Vec<f32> = SELF.classic(16).into_iter().map(encode).collect();
+    let found = SELF.diagnose(&Turn::FlippedX.of(&image, SELF.size));
+    assert_eq!(found, [Finding::Turned(Turn::FlippedX), Finding::Encoded { gamma: None }]);
+    let inches = Finding::Scaled { factors: vec![1.0 / 39.37] };
+    assert!(inches.to_string().contains("R is 1/39.37 times") && inches.to_string().contains("by 39.37"), "{inches}");
+}
+
+#[test]
+fn a_symmetrical_scene_says_what_it_cannot_tell() {
+    assert_eq!(alike(&SELF.reference, SELF.size), []);
+    let corner = Bench::library("corner");
+    assert_eq!(alike(&corner.reference, corner.size), [Turn::FlippedY]);
+    let plane = Bench::library("plane");
+    assert_eq!(alike(&plane.reference, plane.size).len(), 3);
+    let image = Turn::FlippedY.of(&corner.classic(4), corner.size);
+    assert_eq!(corner.diagnose(&image), [], "a floor before a wall looks the same");
+    let image = Turn::FlippedX.of(&corner.classic(1), corner.size);
+    assert_eq!(corner.diagnose(&image), [Finding::Turned(Turn::FlippedX)]);
+}
+
+/// What the scene is made for.
+#[test]
+fn the_self_check_shows_what_it_must() {
+    assert!(!SELF.scene.has_occluder());
+    let openness = &SELF.reference.openness;
+    assert!(openness.iter().all(|v| v.is_finite()));
+    let share = |low: f32, high: f32| {
+        openness.iter().filter(|v| (low..high).contains(*v)).count() as f64 / openness.len() as f64
+    };
+    let shares = [(0.0, 0.2), (0.2, 0.4), (0.4, 0.7), (0.7, 0.9), (0.9, 1.1)].map(|(low, high)| share(low, high));
+    assert!(shares.iter().all(|s| *s > 0.03), "{shares:?}");
+    let gbuffer = GBuffer::new(&SELF.geometry.tracer, &SELF.scene.measure.view());
+    let regions = Regions::new(&SELF.scene, &SELF.geometry.tracer, &gbuffer);
+    assert!(regions.pixels(crate::metrics::regions::Region::Footprint).is_empty());
+}
