@@ -1,18 +1,24 @@
 //! What the numbers of an image that lies as it should mean: openness, its codes, openness
 //! through a curve, or openness of another R.
 
-use super::{Finding, Reference, Scaled, samples::square};
+use super::{
+    Finding, Reference, Scaled,
+    samples::{Samples, square},
+};
 use crate::{intake::Curve, layers::linear};
 
 /// Root mean square, noise taken away, from which on a difference is looked into.
 const DIFFERENT: f64 = 0.015;
-/// What is left of the mean square difference under a hypothesis that is taken: a quarter,
-/// half as far.
-const LEFT: f64 = 0.25;
-/// A curve has two free numbers and may bend one estimator into another: it must leave
-/// less, a fifth as far...
-const LEFT_BY_CURVE: f64 = 0.04;
-/// ... and be a curve worth the name: exponent or gain so many times more or less than 1.
+/// What is left of the mean square difference under a hypothesis that is taken, a fifth as
+/// far. The right one leaves its noise; other estimators, held against classic AO, are
+/// nearer to classic AO of another R, or through a curve, but not so near.
+const LEFT: f64 = 0.04;
+/// And what noise may hide of it.
+const CERTAIN: f64 = 0.2;
+/// A curve has two free numbers and bends one estimator into another where openness hardly
+/// varies: the reference must deviate by so much...
+const VARIED: f64 = 0.2;
+/// ... and the curve must be worth the name: exponent or gain so many times more or less than 1.
 const CURVED: f64 = 1.25;
 const GAINED: f64 = 1.15;
 /// Standard errors between two hypotheses that are told from each other.
@@ -24,8 +30,6 @@ struct Hypothesis {
     finding: Finding,
     /// Mean square of what it leaves, and its error.
     left: [f64; 2],
-    /// How much it must leave at most, of what is there without it.
-    most: f64,
 }
 
 /// What explains how an image differs from the reference, if anything does.
@@ -37,7 +41,8 @@ pub(super) fn find(image: &[f32], reference: &Reference, width: usize) -> Option
     let hypotheses = values(image, reference, width).into_iter().chain(scales(image, reference, width));
     let explains = |h: &Hypothesis| {
         let error = without[1].hypot(h.left[1]);
-        h.left[0] < h.most * without[0] + h.left[1] && without[0] - h.left[0] > SURE * error
+        let is_left = h.left[0] < LEFT * without[0] + 2.0 * h.left[1];
+        is_left && h.left[0] + 2.0 * h.left[1] < CERTAIN * without[0] && without[0] - h.left[0] > SURE * error
     };
     let best = hypotheses.filter(explains).reduce(|a, b| if b.left[0] < a.left[0] { b } else { a })?;
     Some(match best.finding {
@@ -68,7 +73,10 @@ fn values(image: &[f32], reference: &Reference, width: usize) -> Vec<Hypothesis>
     let srgb = Finding::Encoded { gamma: None };
     let mut found = Vec::new();
     if let Some(left) = left_by(&srgb) {
-        found.push(Hypothesis { finding: srgb, left, most: LEFT });
+        found.push(Hypothesis { finding: srgb, left });
+    }
+    if Samples::new(image, &reference.openness).deviation() < VARIED {
+        return found;
     }
     let Some(curve) = Curve::fit(&[(image, reference.openness.as_slice())]) else { return found };
     let (gain, exponent) = (curve.gain, curve.exponent);
@@ -83,7 +91,7 @@ fn values(image: &[f32], reference: &Reference, width: usize) -> Vec<Hypothesis>
     // What the sRGB curve explains nearly as well is that.
     let is_srgb = is_display && found.iter().any(|h| h.left[0] < 2.0 * left[0] + 1e-5 + SURE * left[1]);
     if !is_srgb {
-        found.push(Hypothesis { finding, left, most: LEFT_BY_CURVE });
+        found.push(Hypothesis { finding, left });
     }
     found
 }
@@ -93,7 +101,6 @@ fn scales<'a>(image: &'a [f32], reference: &'a Reference, width: usize) -> impl 
     usable.map(move |Scaled { factor, openness }| Hypothesis {
         finding: Finding::Scaled { factors: vec![*factor] },
         left: left(image, openness, width),
-        most: LEFT,
     })
 }
 

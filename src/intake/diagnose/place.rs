@@ -156,8 +156,8 @@ pub(super) fn find(image: &[f32], reference: &Reference, size: [usize; 2]) -> Pl
     let share = |s: &Samples| s.correlation().powi(2);
     let turns = Turn::possible(size).iter().filter_map(|&turn| best(turn));
     let Some((turn, samples)) = turns.reduce(|a, b| {
-        // The first is none; of the others the best.
-        let (least, times) = if a.0 == Turn::None { (GAIN, TIMES) } else { (0.0, 1.0) };
+        // The first is none; of the others the best, but of two alike the simpler, which comes first.
+        let (least, times) = if a.0 == Turn::None { (GAIN, TIMES) } else { (GAIN / 4.0, 1.02) };
         let better = share(&b.1) > share(&a.1) + least && share(&b.1) > share(&a.1) * times;
         if better { b } else { a }
     }) else {

@@ -4,8 +4,12 @@ use super::samples::Samples;
 
 /// Whole pixels that are tried each way.
 const REACH: isize = 3;
-/// Whole pixels must explain this much more of the image's variance.
-const GAIN: f64 = 0.005;
+/// Whole pixels must explain this much more of the image's variance, as a share of what is
+/// explained without.
+const GAIN: f64 = 0.02;
+/// Along an axis where neighbours in the reference differ by less than this, root mean square,
+/// nothing is told: there another estimator looks like a shift.
+const SHARP: f64 = 0.03;
 /// Less than this part of a pixel is no shift: filters and upsampling of other programs may
 /// lean so far.
 const LEAST: f64 = 0.3;
@@ -15,7 +19,7 @@ const SURE: f64 = 6.0;
 const FEWEST: usize = 64;
 
 /// Columns to the right and rows down that an image is shifted by, in halves of a pixel; None
-/// where it is not. First whole pixels, by correlation; then the rest from gradients (Lucas
+/// where it is not, or where the reference has no edges to tell it by. First whole pixels, by correlation; then the rest from gradients (Lucas
 /// and Kanade 1981), beside a gain and an offset of the image. Gradients tell a shift from a
 /// blur, which lies on both sides.
 pub(super) fn find(image: &[f32], reference: &[f32], size: [usize; 2]) -> Option<[f64; 2]> {
@@ -24,18 +28,27 @@ pub(super) fn find(image: &[f32], reference: &[f32], size: [usize; 2]) -> Option
         let samples = Samples::new(image, &moved);
         if samples.pairs() < FEWEST { 0.0 } else { samples.correlation().max(0.0).powi(2) }
     };
+    let sharp = [[1, 0], [0, 1]].map(|by| apart(reference, &moved(reference, size, by)) > SHARP);
+    let reach = sharp.map(|s| if s { REACH } else { 0 });
     let none = share([0, 0]);
-    let all = (-REACH..=REACH).flat_map(|dy| (-REACH..=REACH).map(move |dx| [dx, dy]));
+    let all = (-reach[1]..=reach[1]).flat_map(|dy| (-reach[0]..=reach[0]).map(move |dx| [dx, dy]));
     let (best, most) = all.map(|by| (by, share(by))).fold(([0, 0], none), |a, b| if b.1 > a.1 { b } else { a });
-    let whole = if most > none + GAIN { best } else { [0, 0] };
+    let whole = if most > none * (1.0 + GAIN) + GAIN / 4.0 { best } else { [0, 0] };
     let (part, error) = parts(image, &moved(reference, size, whole), size)?;
     let halves: [f64; 2] = std::array::from_fn(|axis| {
-        let is_part = part[axis].abs() > LEAST && part[axis].abs() > SURE * error[axis];
+        let is_part = sharp[axis] && part[axis].abs() > LEAST && part[axis].abs() > SURE * error[axis];
         let part = if is_part { part[axis] } else { 0.0 };
         // Adding 0 makes the zero positive.
         ((whole[axis] as f64 + part) * 2.0).round() / 2.0 + 0.0
     });
     (halves != [0.0, 0.0]).then_some(halves)
+}
+
+/// Root mean square difference of two pictures, where both hold numbers.
+fn apart(a: &[f32], b: &[f32]) -> f64 {
+    let squares = a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).filter(|s| s.is_finite());
+    let (sum, n) = squares.fold((0.0, 0.0), |(sum, n), s| (sum + s, n + 1.0));
+    if n > 0.0 { (sum / n).sqrt() } else { 0.0 }
 }
 
 /// The picture moved by whole pixels; NaN where it comes from beyond its edge.
