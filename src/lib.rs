@@ -9,6 +9,7 @@ pub mod disk;
 pub mod flatland;
 pub mod gate;
 pub mod golden;
+pub mod intake;
 pub mod judge_cache;
 pub mod kit;
 pub mod layers;
