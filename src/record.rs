@@ -117,6 +117,9 @@ pub struct SuiteInfo {
     pub methods: BTreeMap<String, EstimatorFile>,
     /// The name of the classic estimator.
     pub classic: String,
+    /// The commands of its external renderers that took part, as the suite has them.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub renderers: BTreeMap<String, Vec<String>>,
     /// Its gates, so that a record can be judged anew; empty in records of version 3.
     #[serde(default)]
     pub gates: Vec<Gate>,
@@ -392,6 +395,10 @@ pub struct CaseRecord {
     /// What its images were read from, where they were handed in.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub source: Option<Source>,
+    /// What the commands of an external renderer said, relative to the record; absent for our
+    /// own renderers, and where the run did not come to it.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub log: Option<String>,
     /// Its metrics by occluder, where the scene shows two or more.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub occluders: Vec<OccluderMetrics>,
@@ -409,6 +416,7 @@ impl CaseRecord {
             looks: None,
             replicates: None,
             source: None,
+            log: None,
             occluders: vec![],
         }
     }
@@ -436,6 +444,9 @@ pub struct Timing {
     /// Replicates of the judge that an earlier run had traced, by scene.
     #[serde(default)]
     pub cached_replicates: BTreeMap<String, usize>,
+    /// How often external renderers had to be asked for an image again, by case.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub retries: BTreeMap<String, u32>,
     /// Why the judge's images could not be kept for the next run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cache_trouble: Option<String>,
@@ -475,10 +486,10 @@ impl Record {
         let scenes = self.scenes.iter().map(|s| &s.name).chain(self.verdicts.iter().map(|v| &v.scene));
         let pooled = self.pooled.iter().flat_map(|p| [&p.estimator, &p.renderer]);
         let methods = self.suite.estimators.iter().chain(self.suite.methods.keys()).chain([&self.suite.classic]);
-        for name in cases.chain(scenes).chain(pooled).chain(methods) {
+        for name in cases.chain(scenes).chain(pooled).chain(methods).chain(self.suite.renderers.keys()) {
             check_name(name)?;
         }
-        let of_cases = self.cases.iter().filter_map(|c| c.image.as_ref());
+        let of_cases = self.cases.iter().flat_map(|c| c.image.iter().chain(&c.log));
         let of_scenes = self.scenes.iter().flat_map(|s| [&s.image, &s.look]);
         let of_judges = self.scenes.iter().filter_map(|s| s.judge.as_ref().map(|j| &j.image));
         let of_verdicts = self.verdicts.iter().filter_map(|v| v.picture.as_ref());

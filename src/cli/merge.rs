@@ -55,6 +55,9 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     let first = shards.first();
     let suite = Suite::load(args.suite.as_deref().unwrap_or(&first.suite))?;
     let mut plan = Plan::new(&suite, first.platform, Some(first.seed));
+    if first.without_external {
+        plan = plan.without_external();
+    }
     plan.until_sure = first.until_sure;
     if let Some(filter) = &first.filter {
         plan = plan.only(filter);

@@ -17,6 +17,7 @@ use crate::{
     render::{
         RenderError, Renderer,
         cpu::Cpu,
+        external::{ExternalError, Ready},
         gpu::{Gpu, Persistent},
     },
     report,
@@ -85,7 +86,7 @@ pub struct Args {
     fail_fast: bool,
     /// What renders longer than so many seconds ends with an error: the judge of a scene, a
     /// converged image, the pictures, or the replicates of a case (with --until-sure at each look). On a
-    /// GPU the image at hand is waited for.
+    /// GPU the image at hand is waited for; the command of an external renderer is ended.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     case_timeout: Option<Duration>,
     /// Only say what would be rendered, and what it costs.
@@ -110,12 +111,13 @@ pub struct Args {
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 enum Choice {
-    /// The CPU, and the GPU where there is one.
+    /// The CPU, the GPU where there is one, and the external renderers of the suite.
     #[default]
     Auto,
     /// The CPU only.
     Cpu,
-    /// The CPU, and the GPU on every case; an error where there is none.
+    /// The CPU, and the GPU on every case; an error where there is none. No external
+    /// renderers.
     Gpu,
 }
 
@@ -192,6 +194,9 @@ fn prepare(
         Some(_) => Platform::Gpu,
     };
     let mut plan = Plan::new(suite, platform, args.seed);
+    if args.renderer != Choice::Auto {
+        plan = plan.without_external();
+    }
     plan.base = base(args.base.as_deref(), suite)?;
     plan.no_base = args.no_base;
     if args.base.is_some() && shard.is_some() && !args.until_sure {
@@ -206,6 +211,7 @@ fn prepare(
             return Err(Failure { exit: Exit::Nothing, message });
         }
     }
+    let ready = if args.dry_run { Vec::new() } else { ready(&plan)? };
     let prepared = Prepared::new(&plan)?;
     if args.dry_run {
         let replicates = suite.file.replicates.get();
@@ -217,12 +223,13 @@ fn prepare(
         Some(Err(e)) => Machine::here(e.to_string(), None),
     };
     let gpu = gpu.map(Persistent::new);
-    let folder = folder(args, &prepared, shard, &machine)?;
+    let folder = folder(args, &prepared, shard, &machine, &ready)?;
     let cache = if args.no_cache { None } else { JudgeCache::of_user() };
     let stop = Stop::default();
     interrupt::listen(&stop);
     let means = Means {
         gpu: gpu.as_ref().map(|g| g as &(dyn Renderer + Sync)),
+        external: &ready,
         cache: cache.as_ref(),
         stop,
         case_timeout: args.case_timeout,
@@ -241,12 +248,19 @@ fn prepare(
     finish(&record, &folder, &args.beside, args.format)
 }
 
+/// The external renderers of a plan, their programs found.
+fn ready<'a>(plan: &Plan<'a>) -> Result<Vec<Ready<'a>>, Failure> {
+    let ready = plan.external().map(|r| r.external.find());
+    ready.collect::<Result<_, ExternalError>>().map_err(|e| Failure::usage(format!("suite '{}': {e}", plan.suite.name)))
+}
+
 /// The folder of the record, as an unfinished run of the same plan left it.
 fn folder(
     args: &Args,
     prepared: &Prepared<'_>,
     shard: Option<Shard>,
     machine: &Machine,
+    external: &[Ready<'_>],
 ) -> Result<RecordFolder, Failure> {
     // Another build of the program may round otherwise.
     let program = if args.fresh { None } else { crate::judge_cache::program() };
@@ -256,7 +270,11 @@ fn folder(
         return Ok(folder);
     };
     let shard = shard.map_or_else(String::new, |s| s.to_string());
-    let folder = RecordFolder::resume(&args.out, &format!("{}\n{program}\n{shard}\n", prepared.identity(machine)))?;
+    let mut plan = format!("{}\n{program}\n{shard}\n", prepared.identity(machine));
+    for own in external {
+        plan += &format!("{}\n", own.identity()?);
+    }
+    let folder = RecordFolder::resume(&args.out, &plan)?;
     tell_moved(&folder);
     if folder.is_resumed() {
         tell("aogauge: going on where an unfinished run of the same plan ended (--fresh begins anew)");

@@ -129,6 +129,11 @@ impl<'a> Run<'a> {
         if no_gpu && !gate.renderers.is_empty() && gate.renderers.iter().all(|r| r == "gpu") {
             return Err(idle(format!("this run used no GPU: {}", self.gpu), true));
         }
+        let is_there = |name: &String| name == "cpu" || self.parts.cases.iter().any(|c| c.case.renderer == *name);
+        if !gate.renderers.is_empty() && !gate.renderers.iter().any(is_there) {
+            let names = gate.renderers.join(", ");
+            return Err(idle(format!("this run used none of the renderers it is for: {names}"), true));
+        }
         let mut drafts = Vec::new();
         for scene in self.parts.scenes.iter().filter(|s| gate.applies_to_judge(&s.name)) {
             let metric = match &scene.judge {

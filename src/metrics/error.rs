@@ -95,9 +95,38 @@ pub fn over_darkening(method: &Method<'_>, classic: &Method<'_>) -> Metric {
     Metric::new(MetricName::OverDarkening, None, difference(classic.replicates, method.replicates, method.regions))
 }
 
-/// Mean of O less the CPU's O over the whole image, replicates paired by seed.
-pub fn renderer_difference(own: &[Vec<f32>], cpu: &[Vec<f32>], regions: &Regions) -> Metric {
-    Metric::new(MetricName::RendererDifference, None, difference(own, cpu, regions))
+/// What replicates of the same number in two rows have in common.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pairing {
+    /// The same random numbers, so that their noise cancels in the difference.
+    Seeds,
+    /// Nothing.
+    None,
+}
+
+/// Mean of O less the CPU's O over the whole image. Replicates of our own renderers are
+/// paired by seed. Those of others are independent of the CPU's: the interval is Welch's then, of the
+/// difference of two means.
+pub fn renderer_difference(own: &[Vec<f32>], cpu: &[Vec<f32>], regions: &Regions, pairing: Pairing) -> Metric {
+    let estimate = difference(own, cpu, regions).and_then(|paired| {
+        if pairing == Pairing::Seeds {
+            return Ok(paired);
+        }
+        // Over the pixels that both show, as the paired one.
+        let pixels = regions.measurable(Region::All)?;
+        let shared: Vec<usize> = pixels
+            .iter()
+            .map(|&i| i as usize)
+            .filter(|&i| own.iter().chain(cpu).all(|image| image[i].is_finite()))
+            .collect();
+        let mean = |images: &[Vec<f32>]| {
+            over_replicates(images, |_, image| {
+                Ok(shared.iter().map(|&i| f64::from(image[i])).sum::<f64>() / shared.len() as f64)
+            })
+        };
+        Ok(mean(own)?.less(&mean(cpu)?))
+    });
+    Metric::new(MetricName::RendererDifference, None, estimate)
 }
 
 /// Replicates that are unlike all earlier ones, over all: a number without an error. All

@@ -50,7 +50,8 @@ pub enum MetricName {
     JudgeRmse,
     /// Mean of O(classic) - O over the whole image. On a control, 0 is right.
     OverDarkening,
-    /// Mean of O on this renderer less O on the CPU, same seeds.
+    /// Mean of O on this renderer less O on the CPU: same seeds on the GPU, independent ones on
+    /// external renderers.
     RendererDifference,
     /// Replicates that are unlike all earlier ones, over all replicates. Below 1 where
     /// nothing is random in the image, or one seed served twice.

@@ -208,7 +208,8 @@ fn foreign(folder: &Path, top: &Path) -> Result<Option<PathBuf>, DiskError> {
 }
 
 /// Folders that a run writes, and the ends of the names of their files.
-const WRITTEN: [(&str, &[&str]); 2] = [("images", &["exr"]), (super::pictures::PICTURES, &["png", "svg"])];
+const WRITTEN: [(&str, &[&str]); 3] =
+    [("images", &["exr"]), (super::pictures::PICTURES, &["png", "svg"]), ("logs", &["log"])];
 
 /// Files that a run writes beside them: the record or shard, and reports.
 const FILES: [&str; 7] = [FILE, super::SHARD, "report.md", "report.html", "report.json", "junit.xml", "summary.md"];

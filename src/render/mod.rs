@@ -6,6 +6,7 @@ pub mod brdf;
 pub mod composite;
 pub mod cpu;
 mod estimator;
+pub mod external;
 pub mod gbuffer;
 pub mod gpu;
 mod indirect;

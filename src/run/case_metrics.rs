@@ -5,7 +5,7 @@ use crate::{
     metrics::{
         Absent, Metric,
         artifact::Method,
-        error,
+        error::{self, Pairing},
         judge::{Judge, JudgedRegions, QImage},
         regions::Region,
     },
@@ -15,7 +15,7 @@ use crate::{
 /// What a case is compared with, where it is there.
 pub(super) struct Others<'a> {
     pub classic: Option<Method<'a>>,
-    pub cpu: Option<&'a [Vec<f32>]>,
+    pub cpu: Option<(&'a [Vec<f32>], Pairing)>,
     pub judge: Result<&'a JudgedRegions, Absent>,
     pub image: Result<&'a QImage, Absent>,
     /// Whether the scene has an occluder, so that it should have a judge.
@@ -34,8 +34,8 @@ pub(super) fn metrics(method: &Method<'_>, others: &Others<'_>) -> Vec<Metric> {
     if let Some(classic) = &others.classic {
         metrics.push(error::over_darkening(method, classic));
     }
-    if let Some(cpu) = others.cpu {
-        metrics.push(error::renderer_difference(method.replicates, cpu, method.regions));
+    if let Some((cpu, pairing)) = others.cpu {
+        metrics.push(error::renderer_difference(method.replicates, cpu, method.regions, pairing));
     }
     metrics.push(error::distinct_replicates(method.replicates));
     metrics

@@ -33,6 +33,13 @@ pub struct Done {
     /// Replicates of a judge that an earlier run had traced.
     #[serde(default)]
     pub cached: usize,
+    /// Images of an external renderer that had to be tried again, each time counted.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub retries: u32,
+}
+
+fn is_zero(n: &u32) -> bool {
+    *n == 0
 }
 
 /// The journal of a run.
@@ -80,6 +87,11 @@ pub(super) fn file(plan: &Plan<'_>, scene: &str, unit: &Unit<'_>) -> PathBuf {
 /// The image of a case, relative to the record.
 pub(super) fn case_image(case: &Case) -> String {
     format!("images/{}/{}.{}.{}.exr", case.scene, case.estimator, case.renderer, case.rays)
+}
+
+/// What the commands of an external renderer's case said, relative to the record.
+pub(super) fn case_log(case: &Case) -> String {
+    format!("logs/{}/{}.{}.{}.log", case.scene, case.estimator, case.renderer, case.rays)
 }
 
 /// The pictures of a scene, relative to the record.

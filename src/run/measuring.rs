@@ -12,7 +12,7 @@ use super::{
     subject::Subject,
 };
 use crate::{
-    metrics::{Absent, artifact::Method as Measured, judge::JudgedRegions, regions::Regions},
+    metrics::{Absent, artifact::Method as Measured, error::Pairing, judge::JudgedRegions, regions::Regions},
     record::{CaseRecord, OccluderMetrics, RecordFolder, SceneRecord, Undecided},
     suite::Case,
 };
@@ -135,6 +135,8 @@ impl Subject<'_> {
                 |regions| beside.and_then(|truth| Some(measured(images(&on_classic)?, &truth.converged, regions)));
             let on_cpu = Case { renderer: "cpu".into(), ..case.clone() };
             let cpu = images(&on_cpu).filter(|_| case.renderer != "cpu");
+            // Whoever draws random numbers of their own shares none with the CPU.
+            let cpu = cpu.map(|images| (images, if case.is_external() { Pairing::None } else { Pairing::Seeds }));
             let others = Others {
                 classic: classic_on(regions),
                 cpu,
@@ -151,6 +153,7 @@ impl Subject<'_> {
                 replicates: Some(replicates.len() as u32),
                 looks: counts.look(case),
                 source: None,
+                log: None,
                 occluders: self.by_occluder(index, &method, &classic_on, judged),
             });
         }

@@ -5,6 +5,7 @@ use super::{
     BUILD, Means, Observer, Prepared, RunError,
     journal::{self, Done, Journal},
     shard::ShardRecord,
+    unit::Unit,
 };
 use crate::{
     disk::DiskError,
@@ -65,6 +66,7 @@ impl Shards {
                 ("time to go on until sure", shard.max_time != one.max_time),
                 ("base record", shard.base != one.base),
                 ("platform", shard.platform != one.platform),
+                ("use of external renderers", shard.without_external != one.without_external),
                 ("GPU", shard.machine.gpu != one.machine.gpu && shard.identity != one.identity),
                 ("content of the suite or of a scene", shard.identity != one.identity),
             ];
@@ -130,6 +132,7 @@ impl Shards {
         let journal = Journal { folder: &folder };
         for part in &parts {
             part.copy(folder.path())?;
+            part.copy_log(folder.path())?;
             journal.note(part.done)?;
         }
         let means = Means {
@@ -200,7 +203,11 @@ impl Shards {
                 let Some((from, done)) = found else {
                     return Err(MergeError::Missing(format!("no shard has rendered {id}")));
                 };
-                parts.push(Part { from, file: journal::file(set.subject.plan, &set.scene.name, &unit), done });
+                let log = match &unit {
+                    Unit::Case(case) if case.is_external() => Some(journal::case_log(case)),
+                    _ => None,
+                };
+                parts.push(Part { from, file: journal::file(set.subject.plan, &set.scene.name, &unit), log, done });
             }
         }
         Ok(parts)
@@ -211,6 +218,8 @@ impl Shards {
 struct Part<'a> {
     from: &'a Path,
     file: PathBuf,
+    /// What the commands of an external renderer said.
+    log: Option<String>,
     done: &'a Done,
 }
 
@@ -242,6 +251,20 @@ impl Part<'_> {
         let parent = target.parent().unwrap_or(to);
         fs::create_dir_all(parent).map_err(DiskError::io(parent, "create the folder"))?;
         fs::copy(&source, &target).map(|_| ()).map_err(DiskError::io(&source, "copy the image"))
+    }
+}
+
+impl Part<'_> {
+    /// Copies its log. That it was lost costs no image.
+    fn copy_log(&self, to: &Path) -> Result<(), DiskError> {
+        let Some(log) = &self.log else { return Ok(()) };
+        let (source, target) = (self.from.join(log), to.join(log));
+        if !fs::symlink_metadata(&source).is_ok_and(|found| found.is_file()) {
+            return Ok(());
+        }
+        let parent = target.parent().unwrap_or(to);
+        fs::create_dir_all(parent).map_err(DiskError::io(parent, "create the folder"))?;
+        fs::copy(&source, &target).map(|_| ()).map_err(DiskError::io(&source, "copy the log"))
     }
 }
 

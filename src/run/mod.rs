@@ -8,6 +8,7 @@
 
 mod case_metrics;
 mod error;
+mod external;
 mod faults;
 mod journal;
 mod judging;
@@ -49,7 +50,7 @@ use crate::{
         CaseRecord, HandedIn, Machine, Record, RecordFolder, SceneRecord, SuiteInfo, Summary, Timing, Undecided,
         UntilSure, VERSION,
     },
-    render::Renderer,
+    render::{Renderer, external::Ready},
     suite::{Case, EstimatorFile, Plan, Suite},
 };
 use error::MAX_GIB;
@@ -71,6 +72,8 @@ pub struct Means<'a> {
     pub cpu: &'a (dyn Renderer + Sync),
     /// Who renders the cases on `gpu`.
     pub gpu: Option<&'a (dyn Renderer + Sync)>,
+    /// Who renders the cases of external renderers.
+    pub external: &'a [Ready<'a>],
     /// What earlier runs judged.
     pub cache: Option<&'a JudgeCache>,
     /// The machine, for the record. A GPU that it calls hardware works beside the CPU.
@@ -79,7 +82,7 @@ pub struct Means<'a> {
     pub stop: Stop,
     /// A unit that takes longer ends with an error: a judge, a converged image, pictures, or
     /// the replicates of a case (at each look, where there are several). The CPU looks at it within
-    /// an image, other renderers between two.
+    /// an image, the GPU between two; an external renderer is ended.
     pub case_timeout: Option<Duration>,
     /// After how long no replicates are added any more where a plan goes on until it is sure.
     /// What then comes of it depends on the machine's speed.
@@ -99,6 +102,7 @@ impl<'a> Means<'a> {
         Means {
             cpu,
             gpu: None,
+            external: &[],
             cache: None,
             machine,
             stop: Stop::default(),
@@ -200,11 +204,14 @@ impl<'a> Prepared<'a> {
         let until = means.max_time.and_then(|t| start.checked_add(t));
         let (mut ended, mut stopped, mut undecided) = (None, false, Vec::new());
         for set in &self.sets {
-            let studio = Studio { set, means, journal: Journal { folder }, progress: &progress, until };
+            let studio = Studio::new(set, means, Journal { folder }, &progress, until);
             let mut rendered = Rendered::default();
             let counts = studio.scene(&mut rendered)?;
             rendered.note(&set.scene.name, &mut timing);
-            let (scene, records) = set.subject.measure(folder, &rendered, &counts)?;
+            let (scene, mut records) = set.subject.measure(folder, &rendered, &counts)?;
+            for record in &mut records {
+                record.log = rendered.log(&record.case);
+            }
             scenes.extend(scene);
             cases.extend(records);
             ended = ended.or(rendered.ended.as_deref().map(at_first_failure));
@@ -330,6 +337,7 @@ fn suite_info(plan: &Plan<'_>) -> SuiteInfo {
         estimators: methods().map(|m| m.name.clone()).collect(),
         methods: methods().map(|m| (m.name.clone(), EstimatorFile::of(&m.estimator))).collect(),
         classic: suite.methods[suite.classic()].name.clone(),
+        renderers: plan.external().map(|r| (r.file.name.clone(), r.file.command.clone())).collect(),
         gates: suite.gates.clone(),
     }
 }

@@ -130,7 +130,7 @@ impl Prepared<'_> {
         let progress = Progress::new(observer, cost);
         let mut scenes = Vec::new();
         for set in &self.sets {
-            let studio = Studio { set, means, journal: Journal { folder: work }, progress: &progress, until: None };
+            let studio = Studio::new(set, means, Journal { folder: work }, &progress, None);
             let mut rendered = Rendered::default();
             studio.render(&all_but_cases(set), 0, &mut rendered)?;
             if means.stop.is_asked() {

@@ -3,6 +3,7 @@
 
 use super::{
     Means, Progress,
+    external::Handed,
     journal::{self, Done, Journal},
     measuring::Counts,
     set::Set,
@@ -21,7 +22,7 @@ use crate::{
 use std::{
     collections::BTreeMap,
     panic::{AssertUnwindSafe, catch_unwind},
-    sync::{Mutex, PoisonError},
+    sync::{Mutex, OnceLock, PoisonError},
     thread,
     time::Instant,
 };
@@ -34,6 +35,8 @@ pub(super) struct Images {
     pub hash: String,
     /// Seconds of tracing.
     pub seconds: f64,
+    /// Images that an external renderer had to be asked for again.
+    pub retries: u32,
 }
 
 /// What the images of a method are compared with.
@@ -81,6 +84,20 @@ pub(super) struct Studio<'a> {
     pub progress: &'a Progress<'a>,
     /// When no replicates are added any more.
     pub until: Option<Instant>,
+    /// The scene as external renderers read it, once one of them needs it.
+    pub handed: OnceLock<Result<Handed, String>>,
+}
+
+impl<'a> Studio<'a> {
+    pub fn new(
+        set: &'a Set<'a>,
+        means: &'a Means<'a>,
+        journal: Journal<'a>,
+        progress: &'a Progress<'a>,
+        until: Option<Instant>,
+    ) -> Self {
+        Studio { set, means, journal, progress, until, handed: OnceLock::new() }
+    }
 }
 
 impl Studio<'_> {
@@ -224,6 +241,7 @@ impl Studio<'_> {
             }
         }
         let mut trouble = None;
+        let mut retries = known.as_ref().map_or(0, |k| k.retries);
         let clock = Clock { stop: &self.means.stop, start, limit: self.means.case_timeout };
         let mut render = || -> Result<Product, Halt> {
             if self.means.is_merge {
@@ -231,6 +249,11 @@ impl Studio<'_> {
             }
             if *unit == Unit::Judge {
                 return self.trace_judge(&clock, &mut trouble).map(|(pairs, cached)| Product::Judge(pairs, cached));
+            }
+            if let Unit::Case(case) = unit
+                && case.is_external()
+            {
+                return self.external(case, replicates, known.take(), &clock, &mut retries).map(Product::Case);
             }
             let loaded = loaded.get_or_insert_with(open).as_mut().map_err(|e| Halt::Failed(e.to_string()))?;
             match unit {
@@ -257,7 +280,7 @@ impl Studio<'_> {
             _ => (start.elapsed().as_secs_f64(), 0),
         };
         let error = product.as_ref().err().cloned();
-        let mut done = Done { unit: id.to_owned(), seconds, sha256: None, error, cached };
+        let mut done = Done { unit: id.to_owned(), seconds, sha256: None, error, cached, retries };
         if let Ok(product) = &product {
             self.layers(unit, product).write(&path)?;
             done.sha256 = Some(journal::sha256(&path)?);
@@ -322,7 +345,7 @@ impl Studio<'_> {
             Unit::Case(_) => {
                 let replicates = journal::replicates(&layers);
                 let hash = layers.get("mean").map(pixel_hash).filter(|_| fits && replicates.len() > 1)?;
-                Product::Case(Images { replicates, hash, seconds: done.seconds })
+                Product::Case(Images { replicates, hash, seconds: done.seconds, retries: done.retries })
             }
         })
     }
@@ -338,6 +361,9 @@ impl Rendered {
     /// Notes how long it took.
     pub fn note(&mut self, scene: &str, timing: &mut Timing) {
         for done in &self.done {
+            if done.retries > 0 {
+                timing.retries.insert(done.unit.clone(), done.retries);
+            }
             let end = done.unit.strip_prefix(scene).unwrap_or_default();
             if end == "/judge" {
                 timing.judges.insert(scene.to_owned(), done.seconds);
@@ -347,6 +373,12 @@ impl Rendered {
             }
         }
         timing.cache_trouble = timing.cache_trouble.take().or(self.cache_trouble.take());
+    }
+
+    /// The log of an external renderer's case that was rendered, relative to the record.
+    pub fn log(&self, case: &Case) -> Option<String> {
+        let id = case.id();
+        (case.is_external() && self.done.iter().any(|d| d.unit == id)).then(|| journal::case_log(case))
     }
 
     fn take(&mut self, unit: &Unit<'_>, product: Result<Product, String>, done: Done, pixels: usize) {

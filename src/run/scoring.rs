@@ -66,6 +66,7 @@ impl References {
             cases: self.file().scenes.iter().flat_map(in_order).collect(),
             seed: self.file().seed,
             platform: Platform::Cpu,
+            external: false,
             filter: None,
             until_sure: None,
             base: None,
@@ -257,7 +258,7 @@ impl Scored<'_> {
         for handed in self.handed {
             let shows = handed.source.as_ref().map_or(Shows::Openness, |s| s.shows);
             if let (Ok(replicates), Shows::Openness) = (&handed.images, shows) {
-                let images = Images { replicates: replicates.clone(), hash: String::new(), seconds: 0.0 };
+                let images = Images { replicates: replicates.clone(), hash: String::new(), seconds: 0.0, retries: 0 };
                 rendered.images.insert(handed.case.id(), Ok(images));
             }
         }

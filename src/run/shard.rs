@@ -136,6 +136,9 @@ pub struct ShardRecord {
     pub seed: u32,
     /// What there was to render on.
     pub platform: Platform,
+    /// Whether external renderers were left out.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub without_external: bool,
     /// What the names of cases had to contain.
     pub filter: Option<String>,
     /// The most replicates of a run that goes on until it is sure.
@@ -209,7 +212,7 @@ impl Prepared<'_> {
         let until = means.max_time.and_then(|t| start.checked_add(t));
         let (mut units, mut ended, mut early, mut stopped) = (Vec::new(), Vec::new(), None, false);
         for set in &self.sets {
-            let studio = Studio { set, means, journal, progress: &progress, until };
+            let studio = Studio::new(set, means, journal, &progress, until);
             let mut rendered = Rendered::default();
             let own = mine(set, Some(shard));
             match self.plan.until_sure {
@@ -234,6 +237,7 @@ impl Prepared<'_> {
             suite: suite.to_owned(),
             seed: self.plan.seed,
             platform: self.plan.platform,
+            without_external: !self.plan.external,
             filter: self.plan.filter.clone(),
             until_sure: self.plan.until_sure,
             max_time: means.max_time.map(|t| t.as_secs_f64()),

@@ -130,7 +130,7 @@ impl Studio<'_> {
             seconds += frame.seconds;
         }
         let hash = pixel_hash(&moments(&images, set.view.pixels()).0);
-        Ok(Images { replicates: images, hash, seconds })
+        Ok(Images { replicates: images, hash, seconds, retries: 0 })
     }
 
     /// Pictures from the look view: every method, and the path tracer.

@@ -1,6 +1,6 @@
 //! The suite file.
 
-use super::{EstimatorFile, GateFile};
+use super::{EstimatorFile, GateFile, RendererFile};
 use crate::scenes::Count;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
@@ -49,6 +49,9 @@ pub struct SuiteFile {
     /// The methods.
     #[serde(rename = "estimator")]
     pub estimators: Vec<EstimatorFile>,
+    /// Programs that render beside the CPU.
+    #[serde(rename = "renderer", default)]
+    pub renderers: Vec<RendererFile>,
     /// What must hold.
     #[serde(rename = "gate", default)]
     pub gates: Vec<GateFile>,

@@ -4,11 +4,13 @@ mod estimator;
 mod file;
 mod gate;
 mod plan;
+mod renderer;
 
 pub use estimator::EstimatorFile;
 pub use file::{JudgeSettings, Rays, Replicates, SoftwareAdapter, SuiteFile};
 pub use gate::{GateFile, LimitFile};
 pub use plan::{Case, Plan, Platform};
+pub use renderer::{EnvironmentFile, OwnRenderer, RendererFile};
 
 use crate::{
     gate::Gate,
@@ -55,6 +57,8 @@ pub struct Suite {
     pub scenes: Vec<Scene>,
     /// Its methods; one of them is `classic`.
     pub methods: Vec<Method>,
+    /// Its external renderers.
+    pub renderers: Vec<OwnRenderer>,
     /// Its gates.
     pub gates: Vec<Gate>,
 }
@@ -147,7 +151,8 @@ impl Suite {
         }
         let names: Vec<&str> = scenes.iter().map(|s| s.name.as_str()).collect();
         let (methods, gates) = checked(&parsed, &names).map_err(invalid)?;
-        Ok(Suite { name, file: parsed, scenes, methods, gates })
+        let renderers = renderer::build(&parsed, &methods, folder).map_err(invalid)?;
+        Ok(Suite { name, file: parsed, scenes, methods, renderers, gates })
     }
 
     /// A suite from TOML whose scenes are known by name only: enough to measure and to judge, not to
@@ -160,7 +165,7 @@ impl Suite {
         let file: SuiteFile = toml::from_str(text).map_err(toml)?;
         let invalid = |message| SuiteError::Invalid { file: label.to_owned(), message };
         let (methods, gates) = checked(&file, scenes).map_err(invalid)?;
-        Ok(Suite { name: name.to_owned(), file, scenes: Vec::new(), methods, gates })
+        Ok(Suite { name: name.to_owned(), file, scenes: Vec::new(), methods, renderers: Vec::new(), gates })
     }
 
     /// The case of classic AO that a case is compared with: the one of as many
@@ -207,6 +212,13 @@ fn checked(file: &SuiteFile, scenes: &[&str]) -> Result<(Vec<Method>, Vec<Gate>)
         known("software_adapter", &marked.scenes, scenes, "scenes")?;
         traced("software_adapter", &marked.rays, file, &methods)?;
     }
+    let names: Vec<&str> = methods.iter().map(|m| m.name.as_str()).collect();
+    for own in &file.renderers {
+        let of = format!("renderer '{}'", own.name);
+        known(&of, &own.scenes, scenes, "scenes")?;
+        known(&of, &own.estimators, &names, "estimators")?;
+        traced(&of, &own.rays, file, &methods)?;
+    }
     let gates = gates(&file.gates, file, scenes, &methods)?;
     Ok((methods, gates))
 }
@@ -214,6 +226,8 @@ fn checked(file: &SuiteFile, scenes: &[&str]) -> Result<(Vec<Method>, Vec<Gate>)
 /// The gates of a suite, or others in place of them.
 fn gates(entries: &[GateFile], file: &SuiteFile, scenes: &[&str], methods: &[Method]) -> Result<Vec<Gate>, String> {
     let names: Vec<&str> = methods.iter().map(|m| m.name.as_str()).collect();
+    let renderers: Vec<&str> =
+        ["cpu", "gpu"].into_iter().chain(file.renderers.iter().map(|r| r.name.as_str())).collect();
     let mut gates = Vec::with_capacity(entries.len());
     for gate in entries {
         let of = format!("gate '{}'", gate.name);
@@ -222,7 +236,7 @@ fn gates(entries: &[GateFile], file: &SuiteFile, scenes: &[&str], methods: &[Met
         if entries.iter().filter(|g| g.name == gate.name).count() > 1 {
             return Err(format!("two gates are called '{}'", gate.name));
         }
-        known(&of, &gate.renderers, &["cpu", "gpu"], "renderers")?;
+        known(&of, &gate.renderers, &renderers, "renderers")?;
         traced(&of, &gate.rays, file, methods)?;
         gates.push(gate.build(methods).map_err(|e| format!("{of}: {e}"))?);
     }

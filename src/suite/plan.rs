@@ -1,6 +1,6 @@
 //! The cases of a suite on a machine.
 
-use super::Suite;
+use super::{OwnRenderer, Suite};
 use crate::{record::Record, scenes::Scene};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,7 +25,7 @@ pub struct Case {
     pub scene: String,
     /// Estimator by name.
     pub estimator: String,
-    /// `cpu` or `gpu`.
+    /// `cpu`, `gpu`, or that of an external renderer by name.
     pub renderer: String,
     /// Primary rays a pixel.
     pub rays: u32,
@@ -36,6 +36,11 @@ impl Case {
     pub fn id(&self) -> String {
         format!("{}/{}/{}/{}", self.scene, self.estimator, self.renderer, self.rays)
     }
+
+    /// Whether a program of somebody else renders it.
+    pub fn is_external(&self) -> bool {
+        !matches!(self.renderer.as_str(), "cpu" | "gpu")
+    }
 }
 
 /// Everything a run will do.
@@ -43,12 +48,14 @@ impl Case {
 pub struct Plan<'a> {
     /// The suite.
     pub suite: &'a Suite,
-    /// The cases, scene by scene, the CPU's before the GPU's.
+    /// The cases, scene by scene, the CPU's before the GPU's, and those before the others'.
     pub cases: Vec<Case>,
     /// Seed of all randomness.
     pub seed: u32,
     /// What there is to render on.
     pub platform: Platform,
+    /// Whether external renderers take part.
+    pub external: bool,
     /// What the names of cases had to contain, where only some were asked for. The
     /// cases that those are compared with are in the plan, too.
     pub filter: Option<String>,
@@ -62,8 +69,8 @@ pub struct Plan<'a> {
 }
 
 impl<'a> Plan<'a> {
-    /// Lists the cases of a suite on a platform. Methods that the GPU does not
-    /// compute are rendered by the CPU alone.
+    /// Lists the cases of a suite on a platform, and those of its external renderers. Methods
+    /// that the GPU does not compute are rendered by the CPU alone.
     pub fn new(suite: &'a Suite, platform: Platform, seed: Option<u32>) -> Self {
         let marked = &suite.file.software_adapter;
         let mut cases = Vec::new();
@@ -93,12 +100,14 @@ impl<'a> Plan<'a> {
                     }
                 }
             }
+            cases.extend(suite.renderers.iter().flat_map(|r| r.cases(suite, &scene.name)));
         }
         Plan {
             suite,
             cases,
             seed: seed.unwrap_or(suite.file.seed),
             platform,
+            external: true,
             filter: None,
             until_sure: None,
             base: None,
@@ -106,9 +115,17 @@ impl<'a> Plan<'a> {
         }
     }
 
+    /// Leaves out the cases of external renderers.
+    #[must_use]
+    pub fn without_external(mut self) -> Self {
+        self.cases.retain(|c| !c.is_external());
+        self.external = false;
+        self
+    }
+
     /// Keeps the cases whose `scene/estimator/renderer/rays` contains a text, and those
-    /// that they are compared with: classic AO beside them, the CPU's image beside the
-    /// GPU's, and what gates hold them against.
+    /// that they are compared with: classic AO beside them, the CPU's image beside that of
+    /// the GPU or of an external renderer, and what gates hold them against.
     pub fn only(mut self, filter: &str) -> Self {
         let mut wanted: Vec<Case> = self.cases.iter().filter(|c| c.id().contains(filter)).cloned().collect();
         for case in wanted.clone() {
@@ -128,6 +145,12 @@ impl<'a> Plan<'a> {
         let theirs =
             self.cases.iter().filter(|c| c.estimator == other && c.scene == case.scene && c.renderer == case.renderer);
         theirs.max_by_key(|c| (c.rays == case.rays, c.rays))
+    }
+
+    /// The external renderers that have a case.
+    pub fn external(&self) -> impl Iterator<Item = &'a OwnRenderer> {
+        let suite = self.suite;
+        suite.renderers.iter().filter(|r| self.cases.iter().any(|c| c.renderer == r.file.name))
     }
 
     /// The scenes that have a case, in the suite's order.

@@ -4,8 +4,8 @@ use super::{Exit, Failure, bytes, nothing, notice, print, size::parse, tell};
 use crate::{
     golden::{Approval, ApproveError, Candidates, Limits, Selection, Store, check_golden_name},
     record::Record,
+    scenes::check_name,
 };
-use clap::ValueEnum;
 use std::path::PathBuf;
 
 /// Accept images of a record as goldens: all that are selected, or none.
@@ -27,9 +27,9 @@ pub struct Args {
     /// goldens does.
     #[arg(long = "as", value_name = "NAME", value_parser = named)]
     name: Option<String>,
-    /// Whose images.
-    #[arg(long, value_enum, default_value_t)]
-    renderer: Renderer,
+    /// Whose images: cpu, gpu, or an external renderer of the suite by name.
+    #[arg(long, default_value = "cpu", value_name = "NAME", value_parser = renderer)]
+    renderer: String,
     /// What may differ where an image has no noise, as flip=, flip-max=, ssim= or max=,
     /// separated by commas.
     #[arg(long, value_name = "LIMITS")]
@@ -46,13 +46,8 @@ pub struct Args {
     goldens: PathBuf,
 }
 
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-enum Renderer {
-    /// The CPU's.
-    #[default]
-    Cpu,
-    /// The GPU's.
-    Gpu,
+fn renderer(name: &str) -> Result<String, String> {
+    check_name(name).map(|()| name.to_owned())
 }
 
 fn named(name: &str) -> Result<String, String> {
@@ -69,10 +64,7 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     let approval = Approval {
         reason: &args.reason,
         only: Selection::Containing(&args.only),
-        renderer: match args.renderer {
-            Renderer::Cpu => "cpu",
-            Renderer::Gpu => "gpu",
-        },
+        renderer: &args.renderer,
         name: args.name.as_deref(),
         limits: args.tolerance,
         most: args.limit,

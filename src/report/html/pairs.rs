@@ -149,7 +149,11 @@ impl<'a> SceneImages<'a> {
         if own.renderer != "cpu"
             && let Some(cpu) = find(&own.estimator, "cpu")
         {
-            let note = "Both draw the same random numbers, so a renderer that does the same shows nothing here.";
+            let note = if own.is_external() {
+                "Each draws random numbers of its own: what is left of the noise shows, too."
+            } else {
+                "Both draw the same random numbers, so a renderer that does the same shows nothing here."
+            };
             others.push((cpu, "against the CPU".to_owned(), note));
         }
         let classic = &self.record.suite.classic;
