@@ -81,7 +81,9 @@ fn number(value: &Value) -> f64 {
 #[test]
 fn aogauge_as_somebody_elses_renderer_is_the_cpu_within_the_statistics() {
     let dir = tempfile::tempdir().unwrap();
-    let suite = SUITE.replace("\"plane\"", "\"curtain-open\"").replace("replicates = 4", "golden_rays = 4\nreplicates = 8")
+    let suite = SUITE
+        .replace("\"plane\"", "\"curtain-open\"")
+        .replace("replicates = 4", "golden_rays = 4\nreplicates = 8")
         + &renderer("itself", &ITSELF, "")
         + "[[gate]]\nname = 'same'\nmetric = 'renderer-difference'\nrenderers = ['itself']\nequals = 0\nwithin = 0.02\n\
            [[gate]]\nname = 'seeds'\nmetric = 'distinct-replicates'\nmin = 1\n";

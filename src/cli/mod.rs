@@ -15,6 +15,7 @@ mod report;
 mod run;
 mod scene;
 mod schema;
+mod score;
 
 use crate::{
     disk::DiskError,
@@ -86,6 +87,7 @@ enum Verb {
     Golden(golden::Verb),
     #[command(subcommand)]
     Scene(scene::Verb),
+    Score(score::Args),
     Flatland(flatland::Args),
     #[command(subcommand)]
     Bench(bench::Verb),
@@ -166,6 +168,7 @@ impl Cli {
             Verb::Explain(args) => explain::execute(&args),
             Verb::Golden(verb) => golden::execute(&verb),
             Verb::Scene(verb) => scene::execute(&verb),
+            Verb::Score(args) => score::execute(&args),
             Verb::Flatland(args) => flatland::execute(&args),
             Verb::Bench(verb) => bench::execute(&verb),
             Verb::Doctor(args) => doctor::execute(&args),

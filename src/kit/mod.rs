@@ -3,6 +3,7 @@
 
 mod manifest;
 mod scene;
+mod self_check;
 mod suite;
 
 pub use manifest::{Manifest, ManifestScene};

@@ -41,7 +41,7 @@ pub enum KitError {
 /// # Errors
 /// Where a file cannot be written or the scene is too deep to trace.
 pub fn write(scene: &Scene, folder: &Path) -> Result<(), KitError> {
-    let render = |source| KitError::Render { scene: scene.name.clone(), source };
+    let render = of_scene(scene);
     let glb = |scene: &Scene, file: String| {
         write_whole(&folder.join(file), |out| gltf::write_glb(scene, out).map_err(std::io::Error::other))
     };
@@ -75,6 +75,12 @@ pub fn write(scene: &Scene, folder: &Path) -> Result<(), KitError> {
     let page = page(scene);
     write_whole(&folder.join("README.md"), |out| out.write_all(page.as_bytes()))?;
     Ok(())
+}
+
+/// What a renderer says of a scene.
+pub(super) fn of_scene(scene: &Scene) -> impl Fn(RenderError) -> KitError + use<> {
+    let scene = scene.name.clone();
+    move |source| KitError::Render { scene: scene.clone(), source }
 }
 
 fn page(scene: &Scene) -> String {

@@ -3,7 +3,7 @@
 use super::{
     KitError,
     manifest::{Manifest, ManifestScene},
-    scene,
+    scene, self_check,
 };
 use crate::{
     disk::{DiskError, write_whole},
@@ -61,6 +61,7 @@ pub fn write_suite(
     for scene in &suite.scenes {
         scene::write(scene, &folder.join(SCENES).join(&scene.name))?;
     }
+    self_check::write(prepared.seed(), &folder.join(SCENES), &folder.join(SCORING))?;
     let references = References::read(&folder.join(SCORING))?;
     let scenes = references.file().scenes.iter();
     let manifest = Manifest::new(suite, scenes.map(|s| ManifestScene::new(SCENES, s.facts.clone())).collect());

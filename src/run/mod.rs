@@ -33,7 +33,7 @@ pub use error::RunError;
 pub use merge::{MergeError, Shards, find as find_shards};
 pub use progress::Observer;
 pub use references::{References, ReferencesError, ReferencesFile, SceneReferences};
-pub use scoring::Handed;
+pub use scoring::CaseImages;
 pub use shard::{Shard, ShardRecord};
 pub use stop::Stop;
 pub use subject::Facts;
@@ -140,6 +140,11 @@ impl<'a> Prepared<'a> {
     pub fn new(plan: &'a Plan<'a>) -> Result<Self, RunError> {
         let sets = plan.scenes().map(|scene| Set::new(plan, scene)).collect::<Result<_, _>>()?;
         Ok(Prepared { plan, sets })
+    }
+
+    /// The seed of the plan.
+    pub fn seed(&self) -> u32 {
+        self.plan.seed
     }
 
     /// What will be rendered, in order; of a shard its own part.

@@ -256,6 +256,11 @@ impl References {
         Ok(References { folder, file, suite })
     }
 
+    /// Where they lie.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
     /// The suite, without its scenes' geometry.
     pub fn suite(&self) -> &Suite {
         &self.suite

@@ -14,7 +14,6 @@ use super::{
     subject::Subject,
 };
 use crate::{
-    gate::Gate,
     layers::pixel_hash,
     metrics::{
         Absent, Metric, MetricName,
@@ -24,13 +23,13 @@ use crate::{
     },
     record::{CaseRecord, HandedIn, Intervals, Machine, Record, RecordFolder, Shows, Source},
     render::Estimator,
-    suite::{Case, Method, Plan, Platform, Suite},
+    suite::{Case, Method, Plan, Platform, Suite, SuiteError},
 };
 use std::time::Instant;
 
 /// The images of one case, as they were handed in.
 #[derive(Clone, Debug)]
-pub struct Handed {
+pub struct CaseImages {
     /// What they are images of.
     pub case: Case,
     /// Openness, an image a replicate, of the size of the measure view; or why there is none.
@@ -39,32 +38,57 @@ pub struct Handed {
     pub source: Option<Source>,
 }
 
+impl CaseImages {
+    /// Whether they show openness alone.
+    pub fn is_openness(&self) -> bool {
+        self.source.as_ref().is_none_or(|s| s.shows == Shows::Openness)
+    }
+}
+
+/// Images with what they are scored against: all is checked, nothing is measured yet.
+pub struct Ready<'a> {
+    references: &'a References,
+    handed: &'a [CaseImages],
+    /// With the estimators that the kit does not have.
+    suite: Suite,
+    foreign: Vec<String>,
+}
+
 impl References {
-    /// Measures what was handed in and commits its record. `gates` take the place of the
-    /// suite's.
+    /// Makes images ready to be scored. `gates`, a TOML text of `[[gate]]` tables and what errors call
+    /// it, take the place of the suite's.
+    ///
+    /// # Errors
+    /// Where the gates are malformed, or name what is not there.
+    pub fn ready<'a>(&'a self, handed: &'a [CaseImages], gates: Option<(&str, &str)>) -> Result<Ready<'a>, SuiteError> {
+        let mut suite = self.suite().clone();
+        let foreign = add_foreign(&mut suite, handed);
+        if let Some((label, text)) = gates {
+            let scenes: Vec<&str> = self.file().scenes.iter().map(|s| s.facts.name.as_str()).collect();
+            let renderers: Vec<&str> = handed.iter().map(|h| h.case.renderer.as_str()).collect();
+            suite.replace_gates(label, text, &scenes, &renderers)?;
+        }
+        Ok(Ready { references: self, handed, suite, foreign })
+    }
+}
+
+impl Ready<'_> {
+    /// Measures what was handed in and commits its record.
     ///
     /// # Errors
     /// Where references cannot be read, or a file cannot be written. What is wrong with the images of a case ends that case
     /// alone.
-    pub fn score(
-        &self,
-        handed: &[Handed],
-        by: HandedIn,
-        gates: Option<Vec<Gate>>,
-        folder: &RecordFolder,
-    ) -> Result<Record, RunError> {
+    pub fn score(&self, by: HandedIn, folder: &RecordFolder) -> Result<Record, RunError> {
         let start = Instant::now();
-        let mut suite = self.suite().clone();
-        let foreign = add_foreign(&mut suite, handed);
-        suite.gates = gates.unwrap_or(suite.gates);
+        let Ready { references, handed, suite, foreign } = self;
         let in_order = |scene: &SceneReferences| {
             let own = handed.iter().filter(|h| h.case.scene == scene.facts.name);
             own.map(|h| h.case.clone()).collect::<Vec<_>>()
         };
         let plan = Plan {
-            suite: &suite,
-            cases: self.file().scenes.iter().flat_map(in_order).collect(),
-            seed: self.file().seed,
+            suite,
+            cases: references.file().scenes.iter().flat_map(in_order).collect(),
+            seed: references.file().seed,
             platform: Platform::Cpu,
             external: false,
             filter: None,
@@ -73,12 +97,12 @@ impl References {
             no_base: true,
         };
         let (mut scenes, mut cases) = (Vec::new(), Vec::new());
-        for scene in &self.file().scenes {
-            let own: Vec<&Handed> = handed.iter().filter(|h| h.case.scene == scene.facts.name).collect();
+        for scene in &references.file().scenes {
+            let own: Vec<&CaseImages> = handed.iter().filter(|h| h.case.scene == scene.facts.name).collect();
             if own.is_empty() {
                 continue;
             }
-            let loaded = self.load(&plan, scene)?;
+            let loaded = references.load(&plan, scene)?;
             let facts = scene.facts.clone();
             let mut rendered = loaded.rendered;
             let (regions, occluders, on_screen) = (loaded.regions, loaded.occluders, loaded.on_screen);
@@ -94,7 +118,7 @@ impl References {
                 cases.push(record);
             }
             scored.note(&mut rendered);
-            self.look(scene)?.write(&folder.path().join(look_image(&scene.facts.name)))?;
+            references.look(scene)?.write(&folder.path().join(look_image(&scene.facts.name)))?;
             scenes.push(subject.scene_record(folder, &rendered, &judged, &Counts::all(u32::MAX))?);
         }
         let gpu = format!("none was used: the images were handed in, of the renderer '{}'", by.renderer);
@@ -119,9 +143,9 @@ impl References {
 
 /// Adds estimators that the suite does not have: they have no converged image of ours, and
 /// their options are not known.
-fn add_foreign(suite: &mut Suite, handed: &[Handed]) -> Vec<String> {
+fn add_foreign(suite: &mut Suite, handed: &[CaseImages]) -> Vec<String> {
     let mut foreign: Vec<String> = Vec::new();
-    for Handed { case, .. } in handed {
+    for CaseImages { case, .. } in handed {
         if !suite.methods.iter().any(|m| m.name == case.estimator) {
             foreign.push(case.estimator.clone());
             // With rays of its own, so that it is not taken for the classic one.
@@ -136,11 +160,11 @@ fn add_foreign(suite: &mut Suite, handed: &[Handed]) -> Vec<String> {
 struct Scored<'a> {
     subject: &'a Subject<'a>,
     judged: &'a Result<Judged, Unjudged>,
-    handed: &'a [&'a Handed],
+    handed: &'a [&'a CaseImages],
 }
 
 impl Scored<'_> {
-    fn case(&self, handed: &Handed, rendered: &Rendered) -> CaseRecord {
+    fn case(&self, handed: &CaseImages, rendered: &Rendered) -> CaseRecord {
         let failed =
             |why: String| CaseRecord { source: handed.source.clone(), ..CaseRecord::failed(&handed.case, why) };
         let images = match &handed.images {
@@ -197,7 +221,7 @@ impl Scored<'_> {
     /// Every metric over some regions.
     fn metrics(
         &self,
-        handed: &Handed,
+        handed: &CaseImages,
         shows: Shows,
         images: &[Vec<f32>],
         regions: &Regions,
@@ -241,9 +265,9 @@ impl Scored<'_> {
 
     /// The images of classic AO that a case is compared with: as many, of the same renderer;
     /// of as many rays, else of the most.
-    fn classic(&self, case: &Case, replicates: usize) -> Option<&Handed> {
+    fn classic(&self, case: &Case, replicates: usize) -> Option<&CaseImages> {
         let classic = &self.subject.plan.suite.methods[self.subject.plan.suite.classic()].name;
-        let is_openness = |h: &&&Handed| h.source.as_ref().is_none_or(|s| s.shows == Shows::Openness);
+        let is_openness = |h: &&&CaseImages| h.source.as_ref().is_none_or(|s| s.shows == Shows::Openness);
         let theirs = self.handed.iter().filter(|h| h.case.estimator == *classic).filter(is_openness);
         let as_many = theirs.filter(|h| h.images.as_ref().is_ok_and(|i| i.len() == replicates));
         as_many.max_by_key(|h| (h.case.rays == case.rays, h.case.rays)).copied()

@@ -168,6 +168,30 @@ impl Suite {
         Ok(Suite { name: name.to_owned(), file, scenes: Vec::new(), methods, renderers: Vec::new(), gates })
     }
 
+    /// Puts other gates in place of the suite's: a TOML text of `[[gate]]` tables, `label` in
+    /// errors. They may name these scenes and renderers, the suite's estimators, and any ray count.
+    ///
+    /// # Errors
+    /// [`SuiteError`], which names the line or field.
+    pub fn replace_gates(
+        &mut self,
+        label: &str,
+        text: &str,
+        scenes: &[&str],
+        renderers: &[&str],
+    ) -> Result<(), SuiteError> {
+        #[derive(serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct GatesFile {
+            gate: Vec<GateFile>,
+        }
+        let toml = |e| SuiteError::Toml { file: label.to_owned(), source: Box::new(e) };
+        let file: GatesFile = toml::from_str(text).map_err(toml)?;
+        let gates = gates(&file.gate, scenes, renderers, &self.methods);
+        self.gates = gates.map_err(|message| SuiteError::Invalid { file: label.to_owned(), message })?;
+        Ok(())
+    }
+
     /// The case of classic AO that a case is compared with: the one of as many
     /// rays, else, for a method with its own number of rays, that of the most.
     pub fn classic_beside(&self, case: &Case) -> Case {
@@ -219,15 +243,18 @@ fn checked(file: &SuiteFile, scenes: &[&str]) -> Result<(Vec<Method>, Vec<Gate>)
         known(&of, &own.estimators, &names, "estimators")?;
         traced(&of, &own.rays, file, &methods)?;
     }
-    let gates = gates(&file.gates, file, scenes, &methods)?;
+    for gate in &file.gates {
+        traced(&format!("gate '{}'", gate.name), &gate.rays, file, &methods)?;
+    }
+    let renderers: Vec<&str> =
+        ["cpu", "gpu"].into_iter().chain(file.renderers.iter().map(|r| r.name.as_str())).collect();
+    let gates = gates(&file.gates, scenes, &renderers, &methods)?;
     Ok((methods, gates))
 }
 
 /// The gates of a suite, or others in place of them.
-fn gates(entries: &[GateFile], file: &SuiteFile, scenes: &[&str], methods: &[Method]) -> Result<Vec<Gate>, String> {
+fn gates(entries: &[GateFile], scenes: &[&str], renderers: &[&str], methods: &[Method]) -> Result<Vec<Gate>, String> {
     let names: Vec<&str> = methods.iter().map(|m| m.name.as_str()).collect();
-    let renderers: Vec<&str> =
-        ["cpu", "gpu"].into_iter().chain(file.renderers.iter().map(|r| r.name.as_str())).collect();
     let mut gates = Vec::with_capacity(entries.len());
     for gate in entries {
         let of = format!("gate '{}'", gate.name);
@@ -236,8 +263,7 @@ fn gates(entries: &[GateFile], file: &SuiteFile, scenes: &[&str], methods: &[Met
         if entries.iter().filter(|g| g.name == gate.name).count() > 1 {
             return Err(format!("two gates are called '{}'", gate.name));
         }
-        known(&of, &gate.renderers, &renderers, "renderers")?;
-        traced(&of, &gate.rays, file, methods)?;
+        known(&of, &gate.renderers, renderers, "renderers")?;
         gates.push(gate.build(methods).map_err(|e| format!("{of}: {e}"))?);
     }
     Ok(gates)
