@@ -39,8 +39,8 @@ impl Samples {
         self.n as usize
     }
 
-    /// The image's value where it is the same everywhere though the reference varies: its
-    /// deviation is above 0.01, twice the image's range at least a hundred times.
+    /// The image's value where its range is below 1e-4 though the reference deviates by more
+    /// than 0.01.
     pub(super) fn constant(&self) -> Option<f32> {
         let flat = f64::from(self.range[1] - self.range[0]) < 1e-4;
         (flat && self.moments[1].sqrt() > VARIED).then_some(self.first)
