@@ -162,12 +162,22 @@ fn parts(regions: &Regions, width: usize, side: usize) -> Vec<Part> {
             within.entry(i).or_default()[region as usize] = true;
         }
     }
-    let mut parts: BTreeMap<[bool; 5], BTreeMap<[usize; 2], Vec<u32>>> = BTreeMap::new();
+    let mut pixels: BTreeMap<[bool; 5], Vec<u32>> = BTreeMap::new();
     for (i, within) in within {
-        let tile = [i as usize / width / side, i as usize % width / side];
-        parts.entry(within).or_default().entry(tile).or_default().push(i);
+        pixels.entry(within).or_default().push(i);
     }
-    parts.into_iter().map(|(within, tiles)| Part { within, tiles: tiles.into_values().collect() }).collect()
+    // From the corner of each part: a border across a narrow part would halve its tiles.
+    let tiled = |(within, pixels): ([bool; 5], Vec<u32>)| {
+        let place = |i: &u32| [*i as usize / width, *i as usize % width];
+        let corner = pixels.iter().map(place).fold([usize::MAX; 2], |a, b| [a[0].min(b[0]), a[1].min(b[1])]);
+        let mut tiles: BTreeMap<[usize; 2], Vec<u32>> = BTreeMap::new();
+        for i in &pixels {
+            let [y, x] = place(i);
+            tiles.entry([(y - corner[0]) / side, (x - corner[1]) / side]).or_default().push(*i);
+        }
+        Part { within, tiles: tiles.into_values().collect() }
+    };
+    pixels.into_iter().map(tiled).collect()
 }
 
 /// Degrees of freedom of a metric's draws, and what undoes their shrinking.
@@ -365,15 +375,14 @@ mod tests {
         found
     }
 
-    /// Nominal .95. The bands are three standard errors of the simulation and what the
-    /// documentation states (docs/statistics.md).
+    /// Nominal .95; docs/statistics.md states what is measured. Three standard errors of 300
+    /// frames are .04.
     #[test]
     fn intervals_of_one_frame_hold_the_truth_as_often_as_stated() {
-        for (filter, centred, least, most) in [(1, true, 0.92, 0.99), (5, true, 0.90, 1.0), (1, false, 0.95, 1.0)] {
+        for (filter, centred, least, most) in [(1, true, 0.90, 0.99), (5, true, 0.85, 1.0), (1, false, 0.90, 1.0)] {
             let found = coverage(300, filter, centred);
             println!("filter {filter}, centred {centred}: {:.3?}, widths {:.3?}", found.covered, found.width);
             for (name, covered) in NAMES.into_iter().zip(found.covered) {
-                // Absolute errors draw whole tiles, and hold noise alone.
                 assert!((least..=most).contains(&covered), "{name:?}, filter {filter}, centred {centred}: {covered}");
             }
         }
@@ -398,7 +407,7 @@ mod tests {
         let plain = measure_openness(&[image.clone()], &regions);
         assert!(metrics.iter().zip(&plain).all(|(a, b)| a.value == b.value));
         let of = |name, region| metrics.iter().find(|m| m.name == name && m.region == region).unwrap();
-        // Tiles of 4 pixels: 6 columns across a border by 32 rows are 2 x 8 tiles.
+        // Tiles of 4 pixels: 6 columns by 32 rows are 2 x 8 tiles.
         assert_eq!(of(MetricName::Openness, Some(Region::Footprint)).df, Some(15.0));
         assert_eq!(of(MetricName::Contrast, None).df, Some(15.0));
         assert_eq!(of(MetricName::Openness, Some(Region::Left)).df, Some(31.0));
