@@ -74,7 +74,7 @@ pub fn frame(path: &Path, declared: &Declared, view: [u32; 2]) -> Result<Frame, 
         remarks(&found, &mut warnings);
         (found.image.size(), found.image.planes().to_vec(), 0.0)
     } else {
-        integers(picture::decode_samples(path, &bytes)?)
+        integers(&picture::decode_samples(path, &bytes)?)
     };
     drop(bytes);
     check_size(path, size, declared.resolution, view)?;
@@ -88,7 +88,7 @@ pub fn frame(path: &Path, declared: &Declared, view: [u32; 2]) -> Result<Frame, 
 }
 
 /// Size, planes of a range of 1, and the step between two codes; 0 of floats.
-fn integers(samples: Samples) -> ([usize; 2], Vec<Vec<f32>>, f32) {
+fn integers(samples: &Samples) -> ([usize; 2], Vec<Vec<f32>>, f32) {
     let (n, colors) = (samples.channels.max(1), if samples.channels < 3 { 1 } else { 3 });
     fn planes<T: Copy>(values: &[T], n: usize, colors: usize, float: impl Fn(T) -> f32) -> Vec<Vec<f32>> {
         (0..colors).map(|c| values.chunks_exact(n).map(|pixel| float(pixel[c])).collect()).collect()
