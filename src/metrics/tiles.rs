@@ -404,7 +404,7 @@ mod tests {
         let run = || with_draws(100, &image, Some(&truth), &regions, SIZE, measure_openness);
         let metrics = run();
         assert_eq!(metrics, run());
-        let plain = measure_openness(&[image.clone()], &regions);
+        let plain = measure_openness(std::slice::from_ref(&image), &regions);
         assert!(metrics.iter().zip(&plain).all(|(a, b)| a.value == b.value));
         let of = |name, region| metrics.iter().find(|m| m.name == name && m.region == region).unwrap();
         // Tiles of 4 pixels: 6 columns by 32 rows are 2 x 8 tiles.
