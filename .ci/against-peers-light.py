@@ -1,0 +1,244 @@
+"""Holds aogauge's `path-traced`, the judge, against Blender's Cycles and Mitsuba 3, on every scene.
+
+against-peers-light.py KIT... --aogauge PROGRAM --out FOLDER: renders the measure view of each kit with and without the occluder
+with the shipped adapters, and compares irradiance over pi along the transect. Writes light.md, light.svg and
+profiles.svg; ends with 1 where a bin differs too much.
+"""
+
+import argparse
+import itertools
+import math
+import sys
+import time
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+
+from peer_images import Aogauge, Cycles, Kit, Mitsuba, kept
+
+matplotlib.use("svg")
+import matplotlib.pyplot as plt
+
+LIMIT = 0.01  # relative difference of a bin
+NOISE = 0.005  # relative standard error of a bin's difference
+BIN = 8  # columns of the narrowest bin
+FIRST = 8  # images that tell how many more are needed
+# Samples a pixel of an image, and the most samples of all images, all pixels together.
+EACH = {"aogauge": 32, "Cycles": 16, "Mitsuba": 64}
+MOST = {"aogauge": 20e6, "Cycles": 8e6, "Mitsuba": 50e6}
+WHAT = ("with", "without")
+
+
+def mean_se(replicates):
+    return replicates.mean(0), replicates.std(0, ddof=1) / np.sqrt(len(replicates))
+
+
+def columns(images):
+    """Means over the rows of bins of BIN columns, an image a row."""
+    return images.astype("f8").mean(1).reshape(len(images), -1, BIN).mean(2)
+
+
+def enough(render, program, pixels):
+    """Images until the mean bin is known well enough, and the seconds they took."""
+    started = time.time()
+    images = render(EACH[program], 1, FIRST)
+    mean, se = mean_se(columns(images))
+    # Half of the variance is the other program's, and the darkest bins are merged.
+    wanted = FIRST * (np.quantile(se / mean, 0.75) / (NOISE / math.sqrt(2))) ** 2
+    most = MOST[program] / (EACH[program] * pixels)
+    more = math.ceil(min(wanted, most)) - FIRST
+    if more > 0:
+        images = np.concatenate([images, render(EACH[program], 1 + FIRST, more)])
+    return images, time.time() - started
+
+
+def difference(theirs, ours):
+    """Means of both, relative difference and its standard error, of lists of numbers an image."""
+    (m, m_se), (a, a_se) = mean_se(theirs), mean_se(ours)
+    return m, a, a / m - 1, a / m * np.hypot(m_se / m, a_se / a)
+
+
+class Bins:
+    """Neighbours are put together, from the left, until the difference is known well enough; what is left over at the
+    right joins the last. The difference itself decides nothing."""
+
+    def __init__(self, theirs, ours, wide):
+        t, o = columns(theirs), columns(ours)
+        edges, first = [0], 0
+        for last in range(1, t.shape[1] + 1):
+            if difference(t[:, first:last].mean(1), o[:, first:last].mean(1))[3] <= NOISE:
+                edges.append(last)
+                first = last
+        if edges[-1] != t.shape[1]:
+            edges[-1 if len(edges) > 1 else len(edges) :] = [t.shape[1]]
+        spans = list(itertools.pairwise(edges))
+        merged = [difference(t[:, a:b].mean(1), o[:, a:b].mean(1)) for a, b in spans]
+        self.theirs, self.ours, self.difference, self.se = map(np.array, zip(*merged))
+        self.narrow = sum(b - a == 1 for a, b in spans)
+        self.at = np.array([(a + b) * BIN / 2 for a, b in spans])
+        self.widest = max(b - a for a, b in spans)
+        self.of = t.shape[1]
+
+    def wrong(self):
+        """Bins that differ by more than the limit beyond their noise, or are too noisy to tell."""
+        far = np.abs(self.difference) > LIMIT + 3 * self.se
+        return [i for i in range(len(self.at)) if far[i] or self.se[i] > NOISE]
+
+
+def compare(kit, peers, us, images):
+    """Bins and region means of a scene, by program and by whether the occluder stands there."""
+    wide, high = kit.views["measure"]["resolution"]
+    masks = kit.regions()
+    result = {}
+    for twin in (False, True)[: 1 + kit.has_twin()]:
+        render = lambda peer: lambda *of: kept(peer, images, kit, twin, "path-traced", *of)
+        ours, spent = enough(render(us), "aogauge", wide * high)
+        for program, peer in peers.items():
+            theirs, seconds = enough(render(peer), program, wide * high)
+            bins = Bins(theirs, ours, wide)
+            regions = {
+                name: difference(*(i[:, mask].mean(1, dtype="f8") for i in (theirs, ours))) for name, mask in masks.items()
+            }
+            result[program, WHAT[twin]] = {
+                "bins": bins, "regions": regions, "samples": (len(theirs) * EACH[program], len(ours) * EACH["aogauge"]),
+                "seconds": (seconds, spent),
+            }  # fmt: skip
+            print(
+                f"{kit.name}, {WHAT[twin]}, {program}: {len(bins.at)} bins of {bins.of}, largest difference "
+                f"{np.abs(bins.difference).max():.2%}, largest standard error {bins.se.max():.2%}, seconds {seconds:.0f} and {spent:.0f}",
+                file=sys.stderr, flush=True,
+            )  # fmt: skip
+    return result
+
+
+def wrong(kit, result):
+    for (program, what), r in result.items():
+        b = r["bins"]
+        for i in b.wrong():
+            yield f"{program}, {kit.name}, {what}, column {b.at[i]:.0f}: {b.difference[i]:+.2%} (standard error {b.se[i]:.2%})"
+
+
+def summary(kits, results, peers):
+    for program, peer in peers.items():
+        yield f"## {program}\n"
+        yield f"{peer.version}.\n"
+        yield (
+            "| scene | occluder | samples: theirs, aogauge's | bins, widest | largest difference, ± | mean difference | "
+            "left | footprint | right | far |"
+        )
+        yield "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|"
+        for kit in kits:
+            for what in WHAT:
+                if (r := results[kit.name].get((program, what))) is None:
+                    continue
+                b = r["bins"]
+                i = np.abs(b.difference).argmax()
+                cell = lambda region: "" if region not in r["regions"] else "{2:+.2%} ± {3:.2%}".format(*r["regions"][region])
+                yield (
+                    f"| {kit.name if what == 'with' else ''} | {what if kit.has_twin() else 'none'} | "
+                    f"{r['samples'][0]:,}, {r['samples'][1]:,} | {len(b.at)}, {b.widest * BIN} | "
+                    f"**{b.difference[i]:+.2%}** ± {b.se[i]:.2%} | {cell('all')} | "
+                    + " | ".join(map(cell, ("left", "footprint", "right", "far"))) + " |"
+                )  # fmt: skip
+        yield ""
+
+
+def profiles(kit, result, peers):
+    m, radius = kit.views["measure"], kit.radius
+    yield f"### {kit.name}\n"
+    for program in peers:
+        for what in WHAT:
+            if (r := result.get((program, what))) is None:
+                continue
+            b = r["bins"]
+            yield f"{program}, {what if kit.has_twin() else 'no'} occluder:\n"
+            yield "| t/R | theirs | aogauge | difference, % |"
+            yield "|--:|--:|--:|--:|"
+            for at, *row in zip(b.at, b.theirs, b.ours, b.difference * 100, b.se * 100):
+                yield "| {:.2f} | {:.5f} | {:.5f} | {:+.2f} ± {:.2f} |".format((at * m["pixel"] - m["half_size"][0]) / radius, *row)
+            yield ""
+
+
+def plot(kits, results, peers, path, panel, label):
+    plt.rcParams.update({"svg.hashsalt": "aogauge", "font.size": 7})
+    across = 5
+    down = math.ceil(len(kits) / across)
+    figure, axes = plt.subplots(down, across, figsize=(12, 2.1 * down), squeeze=False)
+    for axis in axes.flat[len(kits) :]:
+        axis.axis("off")
+    for axis, kit in zip(axes.flat, kits):
+        m = kit.views["measure"]
+        for (colour, program), (mark, what) in itertools.product(zip(("C0", "C3"), peers), zip(("o", "x"), WHAT)):
+            if (r := results[kit.name].get((program, what))) is not None:
+                t = (r["bins"].at * m["pixel"] - m["half_size"][0]) / kit.radius
+                panel(axis, t, r["bins"], colour, mark, f"{program}, {what} occluder")
+        axis.set_title(kit.name, fontsize=8)
+    handles, labels = axes.flat[0].get_legend_handles_labels()
+    for axis in axes.flat[: len(kits)]:
+        more = axis.get_legend_handles_labels()
+        if len(more[1]) > len(labels):
+            handles, labels = more
+    figure.legend(handles, labels, loc="lower center", ncols=4)
+    figure.supylabel(label)
+    figure.supxlabel("t/R", y=0.035)
+    figure.tight_layout(rect=(0, 0.04, 1, 1))
+    figure.savefig(path, metadata={"Date": None})
+    plt.close(figure)
+
+
+def differences(axis, t, bins, colour, mark, label):
+    axis.errorbar(t, 100 * bins.difference, 300 * bins.se, fmt=mark, ms=2.5, lw=0.6, color=colour, label=label)
+    axis.set(ylim=(-3, 3))
+    axis.axhspan(-100 * LIMIT, 100 * LIMIT, color="0.92", zorder=0)
+
+
+def levels(axis, t, bins, colour, mark, label):
+    axis.semilogy(t, bins.ours, color="0.6", lw=0.8, zorder=0)
+    axis.semilogy(t, bins.theirs, mark, ms=3, mfc="none", mew=0.7, color=colour, label=label)
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("kits", nargs="+", type=Kit)
+    arguments.add_argument("--aogauge", required=True, type=Aogauge)
+    arguments.add_argument("--out", required=True, type=Path)
+    arguments.add_argument("--images", type=Path, help="where rendered images are kept, and taken from")
+    args = arguments.parse_args()
+    peers = {"Cycles": Cycles(), "Mitsuba": Mitsuba()}
+    results = {kit.name: compare(kit, peers, args.aogauge, args.images) for kit in args.kits}
+    lines = [
+        "# Irradiance: Cycles, Mitsuba 3 and aogauge\n",
+        f"Written by `.ci/against-peers-light.py` (`.ci/peers light`) with the shipped adapters: {args.aogauge.version}, "
+        f"`path-traced`, from camera `measure`, at the pixels' centres. Irradiance over pi, means over all rows and {BIN} columns. "
+        f"Where that leaves a standard error of the difference above {NOISE:.1%}, neighbouring bins are put together, from the "
+        f"left, until it does not: *widest* tells how many columns that took. Each bin must agree within {LIMIT:.0%} beyond 3 "
+        f"standard errors.\n",
+        f"Differences are aogauge's irradiance over theirs, less 1, ± one standard error over images of "
+        f"{EACH['Cycles']} (Cycles), {EACH['Mitsuba']} (Mitsuba) and {EACH['aogauge']} (aogauge) paths a pixel, with seeds from 1 up: "
+        f"{FIRST} images, which tell how many more are needed, up to {MOST['Cycles']:.0e}, {MOST['Mitsuba']:.0e} and "
+        f"{MOST['aogauge']:.0e} paths in all.\n",
+        "![differences along the transect](light.svg)\n",
+        "![irradiance along the transect: aogauge as a line, the others as marks](profiles.svg)\n",
+        *summary(args.kits, results, peers),
+        "## Along the transect\n",
+        *itertools.chain.from_iterable(profiles(kit, results[kit.name], peers) for kit in args.kits),
+    ]
+    (args.out / "light.md").write_text("\n".join(lines))
+    plot(args.kits, results, peers, args.out / "light.svg", differences, "aogauge / theirs − 1, %  (bars: 3 standard errors)")
+    plot(args.kits, results, peers, args.out / "profiles.svg", levels, "irradiance / π")
+    for program in peers:
+        of = [r for scene in results.values() for (p, _), r in scene.items() if p == program]
+        every = np.concatenate([r["bins"].difference for r in of])
+        z = np.concatenate([r["bins"].difference / r["bins"].se for r in of if r["bins"].se.all()])
+        means = [r["regions"]["all"] for r in of]
+        print(f"{program}: {len(results)} scenes, {len(every)} bins, largest difference {np.abs(every).max():.2%}, largest standard "
+              f"error {max(r['bins'].se.max() for r in of):.2%}; of whole images at most {max(abs(m[2]) for m in means):.2%}; "
+              f"differences over their standard errors have a deviation of {z.std():.2f}")  # fmt: skip
+    messages = [message for kit in args.kits for message in wrong(kit, results[kit.name])]
+    print("\n".join(messages))
+    sys.exit(bool(messages))
+
+
+if __name__ == "__main__":
+    main()
