@@ -26,7 +26,7 @@ BIN = 8  # columns of the narrowest bin
 FIRST = 8  # images that tell how many more are needed
 # Samples a pixel of an image, and the most samples of all images, all pixels together.
 EACH = {"aogauge": 32, "Cycles": 16, "Mitsuba": 64}
-MOST = {"aogauge": 20e6, "Cycles": 8e6, "Mitsuba": 50e6}
+MOST = {"aogauge": 12e6, "Cycles": 3e6, "Mitsuba": 24e6}
 WHAT = ("with", "without")
 
 
@@ -97,11 +97,10 @@ def compare(kit, peers, us, images):
         for program, peer in peers.items():
             theirs, seconds = enough(render(peer), program, wide * high)
             bins = Bins(theirs, ours, wide)
-            regions = {
-                name: difference(*(i[:, mask].mean(1, dtype="f8") for i in (theirs, ours))) for name, mask in masks.items()
-            }
+            means = [{name: i[:, mask].mean(1, dtype="f8") for name, mask in masks.items()} for i in (theirs, ours)]
+            regions = {name: difference(*(m[name] for m in means)) for name in masks}
             result[program, WHAT[twin]] = {
-                "bins": bins, "regions": regions, "samples": (len(theirs) * EACH[program], len(ours) * EACH["aogauge"]),
+                "bins": bins, "regions": regions, "images": means, "samples": (len(theirs) * EACH[program], len(ours) * EACH["aogauge"]),
                 "seconds": (seconds, spent),
             }  # fmt: skip
             print(
@@ -112,7 +111,38 @@ def compare(kit, peers, us, images):
     return result
 
 
-def wrong(kit, result):
+def contrast(kit, result, program, which):
+    """K(Q) of theirs (0) or ours (1), and its standard error: the highlight contrast of the ratio of irradiances with and
+    without the occluder, against the brighter flank."""
+    cells = {what: result[program, what]["images"][which] for what in WHAT}
+    means = {(what, r): mean_se(images[r]) for what, images in cells.items() for r in ("footprint", "left", "right")}
+    q = {r: means["with", r][0] / means["without", r][0] for r in ("footprint", "left", "right")}
+    flank = max(("left", "right"), key=q.get)
+    ratio = q["footprint"] / q[flank]
+    noise = sum((means[what, r][1] / means[what, r][0]) ** 2 for what in WHAT for r in ("footprint", flank))
+    return ratio - 1, ratio * math.sqrt(noise)
+
+
+def contrasts(kits, results, peers):
+    yield "## Highlight contrast
+"
+    yield "K(Q), what gates hold estimators against, from each program's own irradiance with and without the occluder.
+"
+    yield "| scene | aogauge | " + " | ".join(peers) + " |"
+    yield "|---|--:|" + "--:|" * len(peers)
+    for kit in (k for k in kits if k.has_twin()):
+        # aogauge's images are the same beside every program.
+        both = [contrast(kit, results[kit.name], next(iter(peers)), 1)]
+        both += [contrast(kit, results[kit.name], program, 0) for program in peers]
+        yield f"| {kit.name} | " + " | ".join(f"{k:+.4f} ± {se:.4f}" for k, se in both) + " |"
+    yield ""
+
+
+def wrong(kit, result, peers):
+    for program in peers if kit.has_twin() else ():
+        (theirs, their_se), (ours, our_se) = (contrast(kit, result, program, which) for which in (0, 1))
+        if not abs(ours - theirs) <= LIMIT * (1 + theirs) + 3 * math.hypot(their_se, our_se):
+            yield f"{program}, {kit.name}: K(Q) is {ours:.4f}, theirs {theirs:.4f}"
     for (program, what), r in result.items():
         b = r["bins"]
         for i in b.wrong():
@@ -213,7 +243,7 @@ def main():
         f"`path-traced`, from camera `measure`, at the pixels' centres. Irradiance over pi, means over all rows and {BIN} columns. "
         f"Where that leaves a standard error of the difference above {NOISE:.1%}, neighbouring bins are put together, from the "
         f"left, until it does not: *widest* tells how many columns that took. Each bin must agree within {LIMIT:.0%} beyond 3 "
-        f"standard errors.\n",
+        f"standard errors, and K(Q) within {LIMIT:.0%} of 1 + K(Q) beyond 3.\n",
         f"Differences are aogauge's irradiance over theirs, less 1, ± one standard error over images of "
         f"{EACH['Cycles']} (Cycles), {EACH['Mitsuba']} (Mitsuba) and {EACH['aogauge']} (aogauge) paths a pixel, with seeds from 1 up: "
         f"{FIRST} images, which tell how many more are needed, up to {MOST['Cycles']:.0e}, {MOST['Mitsuba']:.0e} and "
@@ -221,6 +251,7 @@ def main():
         "![differences along the transect](light.svg)\n",
         "![irradiance along the transect: aogauge as a line, the others as marks](profiles.svg)\n",
         *summary(args.kits, results, peers),
+        *contrasts(args.kits, results, peers),
         "## Along the transect\n",
         *itertools.chain.from_iterable(profiles(kit, results[kit.name], peers) for kit in args.kits),
     ]
@@ -230,12 +261,13 @@ def main():
     for program in peers:
         of = [r for scene in results.values() for (p, _), r in scene.items() if p == program]
         every = np.concatenate([r["bins"].difference for r in of])
-        z = np.concatenate([r["bins"].difference / r["bins"].se for r in of if r["bins"].se.all()])
+        noisy = [r["bins"] for r in of if r["bins"].se.all()]
+        z = np.concatenate([b.difference / b.se for b in noisy]) if noisy else np.zeros(1)
         means = [r["regions"]["all"] for r in of]
         print(f"{program}: {len(results)} scenes, {len(every)} bins, largest difference {np.abs(every).max():.2%}, largest standard "
               f"error {max(r['bins'].se.max() for r in of):.2%}; of whole images at most {max(abs(m[2]) for m in means):.2%}; "
               f"differences over their standard errors have a deviation of {z.std():.2f}")  # fmt: skip
-    messages = [message for kit in args.kits for message in wrong(kit, results[kit.name])]
+    messages = [message for kit in args.kits for message in wrong(kit, results[kit.name], peers)]
     print("\n".join(messages))
     sys.exit(bool(messages))
 
