@@ -79,6 +79,7 @@ class Bins:
         self.at = np.array([(a + b) * BIN / 2 for a, b in spans])
         self.widest = max(b - a for a, b in spans)
         self.of = t.shape[1]
+        self.line = o.mean(0)  # aogauge's, at the narrowest bins
 
     def wrong(self):
         """Bins that differ by more than the limit beyond their noise, or are too noisy to tell."""
@@ -124,10 +125,8 @@ def contrast(kit, result, program, which):
 
 
 def contrasts(kits, results, peers):
-    yield "## Highlight contrast
-"
-    yield "K(Q), what gates hold estimators against, from each program's own irradiance with and without the occluder.
-"
+    yield "## Highlight contrast\n"
+    yield "K(Q), what gates hold estimators against, from each program's own irradiance with and without the occluder.\n"
     yield "| scene | aogauge | " + " | ".join(peers) + " |"
     yield "|---|--:|" + "--:|" * len(peers)
     for kit in (k for k in kits if k.has_twin()):
@@ -175,7 +174,6 @@ def summary(kits, results, peers):
 
 
 def profiles(kit, result, peers):
-    m, radius = kit.views["measure"], kit.radius
     yield f"### {kit.name}\n"
     for program in peers:
         for what in WHAT:
@@ -186,7 +184,7 @@ def profiles(kit, result, peers):
             yield "| t/R | theirs | aogauge | difference, % |"
             yield "|--:|--:|--:|--:|"
             for at, *row in zip(b.at, b.theirs, b.ours, b.difference * 100, b.se * 100):
-                yield "| {:.2f} | {:.5f} | {:.5f} | {:+.2f} ± {:.2f} |".format((at * m["pixel"] - m["half_size"][0]) / radius, *row)
+                yield "| {:.2f} | {:.5f} | {:.5f} | {:+.2f} ± {:.2f} |".format(kit.place(at), *row)
             yield ""
 
 
@@ -198,11 +196,9 @@ def plot(kits, results, peers, path, panel, label):
     for axis in axes.flat[len(kits) :]:
         axis.axis("off")
     for axis, kit in zip(axes.flat, kits):
-        m = kit.views["measure"]
         for (colour, program), (mark, what) in itertools.product(zip(("C0", "C3"), peers), zip(("o", "x"), WHAT)):
             if (r := results[kit.name].get((program, what))) is not None:
-                t = (r["bins"].at * m["pixel"] - m["half_size"][0]) / kit.radius
-                panel(axis, t, r["bins"], colour, mark, f"{program}, {what} occluder")
+                panel(axis, kit.place, r["bins"], colour, mark, f"{program}, {what} occluder")
         axis.set_title(kit.name, fontsize=8)
     handles, labels = axes.flat[0].get_legend_handles_labels()
     for axis in axes.flat[: len(kits)]:
@@ -211,21 +207,25 @@ def plot(kits, results, peers, path, panel, label):
             handles, labels = more
     figure.legend(handles, labels, loc="lower center", ncols=4)
     figure.supylabel(label)
-    figure.supxlabel("t/R", y=0.035)
-    figure.tight_layout(rect=(0, 0.04, 1, 1))
+    figure.supxlabel("t/R", y=0.25 / down / 2.1)
+    figure.tight_layout(rect=(0, 0.25 / down / 2.1, 1, 1))
     figure.savefig(path, metadata={"Date": None})
     plt.close(figure)
 
 
-def differences(axis, t, bins, colour, mark, label):
-    axis.errorbar(t, 100 * bins.difference, 300 * bins.se, fmt=mark, ms=2.5, lw=0.6, color=colour, label=label)
+def differences(axis, place, bins, colour, mark, label):
+    axis.errorbar(place(bins.at), 100 * bins.difference, 300 * bins.se, fmt=mark, ms=2.5, lw=0.6, color=colour, label=label)
     axis.set(ylim=(-3, 3))
     axis.axhspan(-100 * LIMIT, 100 * LIMIT, color="0.92", zorder=0)
 
 
-def levels(axis, t, bins, colour, mark, label):
-    axis.semilogy(t, bins.ours, color="0.6", lw=0.8, zorder=0)
-    axis.semilogy(t, bins.theirs, mark, ms=3, mfc="none", mew=0.7, color=colour, label=label)
+def levels(axis, place, bins, colour, mark, label):
+    axis.plot(place((np.arange(bins.of) + 0.5) * BIN), bins.line, color="0.6", lw=0.8, zorder=0)
+    axis.plot(place(bins.at), bins.theirs, mark, ms=3, mfc="none", mew=0.7, color=colour, label=label)
+    if bins.line.max() > 3 * bins.line.min():
+        axis.set_yscale("log")
+    elif axis.get_yscale() == "linear":
+        axis.set_ylim(0, None)
 
 
 def main():

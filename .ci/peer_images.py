@@ -49,6 +49,11 @@ class Kit:
     def has_twin(self):
         return self.glb(True).is_file()
 
+    def place(self, column):
+        """Where along the transect a column lies, in R."""
+        measure = self.views["measure"]
+        return (column * measure["pixel"] - measure["half_size"][0]) / self.radius
+
     def seed(self):
         """A first seed of the scene's own: what two scenes show alike is drawn anew."""
         return 1 + 1000 * (zlib.crc32(self.name.encode()) % 1_000_000)
@@ -110,7 +115,7 @@ class Mitsuba:
         self.checked = set()
 
     def images(self, kit, twin, estimator, rays, first, count):
-        scene = self.adapter.Scene(kit.glb(twin), kit.path / "views.json")
+        scene = self.adapter.Scene(kit.glb(twin), kit.path / "views.json", estimator)
         if kit.name not in self.checked and not twin:
             self.check_camera(kit, scene)
         seeds = range(first, first + count)

@@ -63,13 +63,16 @@ class Surface:
         self.points, self.triangles, self.albedo, self.emission = points, triangles, albedo, emission
 
 
-def read_glb(path):
-    """The surfaces of a kit's GLB. Other GLB files use more of glTF than this reads, and are refused."""
+def read_glb(path, estimator):
+    """The surfaces of a kit's GLB. Where the estimator needs light, what is not read of it is refused."""
     data = Path(path).read_bytes()
     if data[:4] != b"glTF":
         raise SystemExit(f"{path}: this is not a GLB file")
     length = struct.unpack_from("<I", data, 12)[0]
     doc, body = json.loads(data[20 : 20 + length]), data[28 + length :]
+    lit = estimator != "classic"
+    if lit and doc.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights"):
+        raise SystemExit(f"{path}: it has punctual lights, which are not read; classic needs none")
 
     def accessor(index):
         a = doc["accessors"][index]
@@ -82,21 +85,27 @@ def read_glb(path):
 
     surfaces = []
     for node in (n for n in doc["nodes"] if "mesh" in n):
+        name = node.get("name")
         if {"matrix", "translation", "rotation", "scale"} & node.keys():
-            raise SystemExit(f"{path}: node {node.get('name')} is moved; a kit's geometry stands in place")
+            raise SystemExit(f"{path}: node {name} is moved; a kit's geometry stands in place")
         for primitive in doc["meshes"][node["mesh"]]["primitives"]:
             material = doc["materials"][primitive["material"]]
-            surface = material["pbrMetallicRoughness"]
-            if "baseColorTexture" in surface or "emissiveTexture" in material:
-                raise SystemExit(f"{path}: {node.get('name')} has a texture, which is not read")
-            strength = material.get("extensions", {}).get("KHR_materials_emissive_strength", {})
-            emission = np.array(material.get("emissiveFactor", [0, 0, 0])) * strength.get("emissiveStrength", 1.0)
-            surfaces.append(
-                Surface(accessor(primitive["attributes"]["POSITION"]),
-                        accessor(primitive["indices"]).reshape(-1, 3).astype("u4"),
-                        np.array(surface.get("baseColorFactor", [1, 1, 1])[:3]), emission)
-            )  # fmt: skip
+            if lit and any(key.endswith("Texture") for key in material | material["pbrMetallicRoughness"]):
+                raise SystemExit(f"{path}: {name} has a texture, which is not read; classic needs none")
+            points = accessor(primitive["attributes"]["POSITION"])
+            triangles = accessor(primitive["indices"]).reshape(-1, 3).astype("u4")
+            surfaces.append(Surface(points, triangles, *colours(material)))
     return surfaces
+
+
+def colours(material):
+    """Albedo and emission of a material, as aogauge takes them: metal sends nothing back diffusely, and nothing sends back
+    more than 0.98."""
+    surface, extensions = material["pbrMetallicRoughness"], material.get("extensions", {})
+    albedo = np.array(surface.get("baseColorFactor", [1, 1, 1])[:3]) * (1 - surface.get("metallicFactor", 1.0))
+    albedo = np.clip(albedo, 0, 0.98)
+    strength = extensions.get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
+    return albedo, np.array(material.get("emissiveFactor", [0, 0, 0])) * strength
 
 
 class Kit:

@@ -204,10 +204,11 @@ class Scene:
     """A kit's scene in Blender."""
 
     def __init__(self, glb, views):
-        self.kit, self.surfaces = Kit(views), read_glb(glb)
+        self.glb, self.kit = glb, Kit(views)
 
     def prepare(self, estimator, rays, radius):
         """Empties Blender and builds the scene for an estimator."""
+        surfaces = read_glb(self.glb, estimator)
         bpy.ops.wm.read_factory_settings(use_empty=True)
         settings()
         camera(self.kit.measure)
@@ -217,13 +218,13 @@ class Scene:
             node = max(n for n in range(1, MOST_OF_NODE + 1) if rays % n == 0)
             scene.cycles.samples = rays // node
             shared = open_share(radius, node)
-            geometry(self.surfaces, lambda surface: shared)
+            geometry(surfaces, lambda surface: shared)
             # What sees nothing is open.
             scene.world = bpy.data.worlds.new("open")
             scene.world.use_nodes = True
             scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (1, 1, 1, 1)
         else:
-            geometry(self.surfaces, matte)
+            geometry(surfaces, matte)
             world(self.kit)
 
     def render(self, seed):

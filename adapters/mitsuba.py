@@ -115,10 +115,10 @@ def gradient(zenith, horizon, ground):
 class Scene:
     """A kit's scene in Mitsuba, and what the pixels' centres see of it."""
 
-    def __init__(self, glb, views):
+    def __init__(self, glb, views, estimator):
         kit = Kit(views)
         parts = {"type": "scene"} | lights(kit)
-        for i, surface in enumerate(read_glb(glb)):
+        for i, surface in enumerate(read_glb(glb, estimator)):
             for j, m in enumerate(surface_meshes(surface)):
                 parts[f"surface {i}-{j}"] = m
         self.scene = mi.load_dict(parts)
@@ -179,7 +179,7 @@ class Scene:
 def main():
     args = arguments(sys.argv[1:], __doc__.split("\n")[0], "mitsuba.py")
     start()
-    scene = Scene(args.scene, args.view)
+    scene = Scene(args.scene, args.view, args.estimator)
     if args.estimator == "classic":
         image = scene.openness(args.rays, args.seed, args.radius)
     else:
