@@ -132,18 +132,19 @@ def main():
     peers = {"Cycles": Cycles(), "Mitsuba": Mitsuba()}
     results = {program: {} for program in peers}
     for kit in args.kits:
-        ours = kept(args.aogauge, args.images, kit, False, "classic", RAYS, kit.seed(), REPLICATES).astype("f8")
+        ours = kept(args.aogauge, args.images, kit, False, "classic", RAYS, 1, REPLICATES).astype("f8")
         for program, peer in peers.items():
-            theirs = kept(peer, args.images, kit, False, "classic", RAYS, kit.seed(), REPLICATES).astype("f8")
+            theirs = kept(peer, args.images, kit, False, "classic", RAYS, 1, REPLICATES).astype("f8")
             results[program][kit.name] = list(tests_of(kit, theirs, ours))
     for program in peers:
         holm([t for r in results[program].values() for t in r])
     lines = [
         "# Ambient occlusion: Cycles, Mitsuba 3 and aogauge\n",
         f"Written by `.ci/against-peers-ao.py` (`.ci/peers ao`) with the shipped adapters: {args.aogauge.version}, `classic`, "
-        f"from camera `measure`, at the pixels' centres. {REPLICATES} images of {RAYS} rays a pixel each of each program, with "
-        f"seeds of the scene's own; aogauge's are replicates of the first of them. Differences are aogauge's openness less "
-        f"theirs, ± one standard error.\n",
+        f"from camera `measure`, at the pixels' centres. {REPLICATES} images of {RAYS} rays a pixel each, seeds 1 to "
+        f"{REPLICATES}, of each program; aogauge's are the replicates of seed 1. Differences are aogauge's openness less "
+        f"theirs, ± one standard error. Scenes with the same curtain over the same floor share their random numbers, and so "
+        f"their differences.\n",
         f"Every region and every tile of {TILE} x {TILE} pixels is a two-sided Welch test over images; `all` is the whole "
         f"image. Holm's correction over all tests of a program keeps the chance of any false alarm at {ALPHA:.0%}. "
         f"*Detectable* is the difference that a test would see with probability {POWER} at the strictest of Holm's levels.\n",

@@ -266,7 +266,7 @@ def main():
         means = [r["regions"]["all"] for r in of]
         print(f"{program}: {len(results)} scenes, {len(every)} bins, largest difference {np.abs(every).max():.2%}, largest standard "
               f"error {max(r['bins'].se.max() for r in of):.2%}; of whole images at most {max(abs(m[2]) for m in means):.2%}; "
-              f"differences over their standard errors have a deviation of {z.std():.2f}")  # fmt: skip
+              f"differences over their standard errors have a deviation of {z.std():.2f} (t of {FIRST - 1} degrees of freedom: {math.sqrt((FIRST - 1) / (FIRST - 3)):.2f})")  # fmt: skip
     messages = [message for kit in args.kits for message in wrong(kit, results[kit.name], peers)]
     print("\n".join(messages))
     sys.exit(bool(messages))

@@ -9,7 +9,6 @@ import json
 import subprocess
 import sys
 import tempfile
-import zlib
 from pathlib import Path
 
 import numpy as np
@@ -53,10 +52,6 @@ class Kit:
         """Where along the transect a column lies, in R."""
         measure = self.views["measure"]
         return (column * measure["pixel"] - measure["half_size"][0]) / self.radius
-
-    def seed(self):
-        """A first seed of the scene's own: what two scenes show alike is drawn anew."""
-        return 1 + 1000 * (zlib.crc32(self.name.encode()) % 1_000_000)
 
     def regions(self):
         """Masks by name, of those that are not empty."""
