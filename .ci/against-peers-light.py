@@ -225,7 +225,7 @@ def levels(axis, place, bins, colour, mark, label):
     if bins.line.max() > 3 * bins.line.min():
         axis.set_yscale("log")
     elif axis.get_yscale() == "linear":
-        axis.set_ylim(0, None)
+        axis.set_ylim(0, 1.2 * max(bins.line.max(), axis.get_ylim()[1] / 1.2))
 
 
 def main():
