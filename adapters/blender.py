@@ -183,7 +183,7 @@ def settings():
     cycles.use_denoising = False
     cycles.use_adaptive_sampling = False
     cycles.time_limit = 0
-    cycles.pixel_filter_type = "BOX"
+    cycles.pixel_filter_type = "GAUSSIAN"  # Cycles' box is a pixel wide, whatever its width is set to
     cycles.filter_width = 0.01
     cycles.use_animated_seed = False
     # Nothing is cut off, blurred or approximated.

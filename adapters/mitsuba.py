@@ -31,6 +31,9 @@ SCALE = 100
 OFFSET = 1e-5
 # The back of what shines, metres behind its front: Mitsuba's triangles shine to one side.
 BEHIND = 1e-4
+# Mitsuba takes no notice of what blocks a light within 0.09 % of the way to it. So what stands for an opening is moved out by
+# more than that; in place, the eaves round a courtyard let 0.4 % of the light through.
+OUTWARD = 0.003  # of the distance from the view
 AT_ONCE = 1 << 23  # samples in memory
 
 
@@ -94,6 +97,8 @@ def lights(kit):
         centre = corner + (u + v) / 2
         if np.dot(np.cross(u, v), inside - centre) < 0:
             u, v = v, u
+        farthest = np.linalg.norm(inside - centre) + np.linalg.norm(u) + np.linalg.norm(v)
+        centre = centre - OUTWARD * farthest * np.cross(u, v) / np.linalg.norm(np.cross(u, v))
         columns = np.column_stack([u / 2, v / 2, np.cross(u, v), centre])
         parts[f"opening {i}"] = {
             "type": "rectangle",
