@@ -294,8 +294,10 @@ pub(super) fn tell_moved(folder: &RecordFolder) {
 pub(super) fn finish(record: &Record, folder: &RecordFolder, beside: &Beside, format: Format) -> Result<Exit, Failure> {
     let files = beside.make(record, folder.path(), format)?;
     let exit = Exit::of(record);
+    let done = if record.handed_in.is_some() { "scored" } else { "rendered" };
+    let bare = format!("{done}; the suite has no gates");
     let end = match exit {
-        Exit::Pass if record.verdicts.is_empty() && record.idle_gates.is_empty() => "rendered; the suite has no gates",
+        Exit::Pass if record.verdicts.is_empty() && record.idle_gates.is_empty() => &bare,
         Exit::Pass if record.verdicts.is_empty() => "rendered; the gates wait for a base record (--no-base)",
         Exit::Nothing => "nothing was judged: the suite has gates, and none of them was held against anything",
         Exit::Pass => "pass",

@@ -8,6 +8,7 @@ pub mod digest;
 mod error_maps;
 pub mod flatland;
 mod gallery;
+pub(crate) mod handed_in;
 pub mod github;
 pub mod html;
 pub mod junit;

@@ -21,7 +21,7 @@ use crate::{
         regions::{Region, Regions},
     },
     record::{RecordFolder, ScreenRecord},
-    suite::{Plan, Suite, SuiteError},
+    suite::{Plan, Suite, SuiteError, SuiteFile},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -168,7 +168,7 @@ impl Prepared<'_> {
             scenes,
         };
         let path = folder.join(SUITE);
-        let text = toml::to_string_pretty(&self.plan.suite.file)
+        let text = toml::to_string_pretty(&without_programs(&self.plan.suite.file))
             .map_err(|e| DiskError::content(&path, format!("the suite cannot be written: {e}")))?;
         write_whole(&path, |buffer| buffer.write_all(text.as_bytes()))?;
         let path = folder.join(FILE);
@@ -176,6 +176,19 @@ impl Prepared<'_> {
             .map_err(|e| DiskError::content(&path, format!("the references cannot be written: {e}")))?;
         Ok(write_whole(&path, |buffer| buffer.write_all(format!("{text}\n").as_bytes()))?)
     }
+}
+
+/// A suite without the programs that render for it: a kit is given to others, and has no use
+/// for their command lines and environments. Gates on them alone go with them.
+fn without_programs(file: &SuiteFile) -> SuiteFile {
+    let mut file = file.clone();
+    file.renderers.clear();
+    file.gates.retain_mut(|gate| {
+        let named = gate.renderers.len();
+        gate.renderers.retain(|r| r == "cpu" || r == "gpu");
+        named == 0 || !gate.renderers.is_empty()
+    });
+    file
 }
 
 /// Judge, converged images and pictures.
@@ -396,7 +409,7 @@ impl SceneReferences {
             return Err(format!("scene '{}': '{file}' is no name of an image", facts.name));
         }
         let [w, h] = facts.resolution;
-        if facts.transect.len() != w as usize || h == 0 || !(facts.radius > 0.0) {
+        if facts.transect.len() != w as usize || h == 0 || facts.radius.is_nan() || facts.radius <= 0.0 {
             return Err(format!("scene '{}': resolution, transect and radius do not go together", facts.name));
         }
         let missing = [Some(REGIONS), facts.has_occluder.then_some(JUDGE)];

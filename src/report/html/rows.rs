@@ -1,6 +1,7 @@
 //! What a record says, as the page's rows.
 
 use super::super::{
+    handed_in,
     markdown::scene::judge_text,
     plots::{self, Ranges},
     table::{self, detectable_text, value_text},
@@ -45,6 +46,7 @@ pub(super) fn overall(record: &Record) -> &'static str {
 pub(super) fn notes(record: &Record) -> Vec<String> {
     let mut notes = Vec::new();
     notes.extend(record.incomplete.iter().map(|why| format!("The run is incomplete: {why}.")));
+    notes.extend(handed_in::notes(record));
     notes.extend(record.filter.iter().map(|f| format!("Only cases whose name contains '{f}' were run.")));
     let failed = record.scenes.iter().filter_map(|s| Some((&s.name, s.judge_error.as_ref()?)));
     notes.extend(failed.map(|(scene, why)| format!("The judge of scene '{scene}' failed: {why}.")));

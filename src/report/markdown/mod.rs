@@ -15,6 +15,7 @@ use super::{
     definitions::{self, Definition},
     error_maps::{LIMIT_CONVERGED, LIMIT_Q},
     gallery::Gallery,
+    handed_in,
     pooled::{self, PooledRow},
     table::{self, Row, outcome_text, plus_minus},
 };
@@ -51,6 +52,8 @@ struct Context<'a> {
     sign: &'static str,
     summary: String,
     replicates: String,
+    /// What must be known of images that were handed in.
+    handed_in: Vec<String>,
     /// Whether tables are cut, so that the page is not too large.
     brief: bool,
     attention: Option<Attention>,
@@ -134,6 +137,9 @@ fn replicates(record: &Record) -> String {
     let counts = || record.cases.iter().filter(|c| c.error.is_none()).map(|c| record.replicates(c));
     let seeds = "replicates with seeds of their own";
     match (counts().min(), counts().max()) {
+        (Some(least), Some(most)) if least < most && record.handed_in.is_some() => {
+            format!("{least} to {most} images a case, as they were handed in")
+        }
         (Some(least), Some(most)) if least < most => {
             format!("{least} to {most} {seeds}, each case as many as its verdicts took")
         }
@@ -166,6 +172,7 @@ fn context<'a>(record: &'a Record, gallery: &Gallery, brief: bool) -> Result<Con
         sign,
         summary: record.summary_line(),
         replicates: replicates(record),
+        handed_in: handed_in::notes(record),
         brief,
         attention: Some(Attention::new(record, gallery)?).filter(|a| !a.is_empty()),
         rows: table::rows(record).into_iter().map(SignedRow::new).collect(),
