@@ -110,7 +110,8 @@ impl Images {
     fn score(&self, options: &[&str]) -> (i32, String) {
         let kit = world().join("kit").display().to_string();
         let (folder, out) = (self.folder.path().display().to_string(), self.out().display().to_string());
-        let output = aogauge(&[&["score", &folder, "--kit", &kit, "--out", &out, "--renderer", "mine"], options].concat());
+        let output =
+            aogauge(&[&["score", &folder, "--kit", &kit, "--out", &out, "--renderer", "mine"], options].concat());
         (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap())
     }
 
@@ -166,7 +167,10 @@ fn our_own_images_have_the_metrics_of_the_run() {
         for (own, theirs) in side_by_side(&mine, &run) {
             assert_eq!(own, theirs);
         }
-        assert_eq!((&mine.pooled[0].contrast_error, &mine.pooled[1].removed), (&run.pooled[0].contrast_error, &run.pooled[1].removed));
+        assert_eq!(
+            (&mine.pooled[0].contrast_error, &mine.pooled[1].removed),
+            (&run.pooled[0].contrast_error, &run.pooled[1].removed)
+        );
         assert_eq!(mine.scenes[0].profiles, run.scenes[0].profiles);
         assert_eq!(mine.scenes[0].convergence.len(), run.scenes[0].convergence.len());
         // A gate on our own renderers is no gate on theirs.
@@ -190,9 +194,13 @@ fn as_png_they_are_off_by_rounding() {
                     let path = images.folder.path().join(format!("{scene}.{estimator}.4.{r:04}.png"));
                     let at = |x: u32, y: u32| image[(y * w + x) as usize].max(0.0);
                     if bits == 16 {
-                        image::ImageBuffer::from_fn(w, h, |x, y| image::Luma([(at(x, y) * 65535.0).round() as u16])).save(&path).unwrap();
+                        image::ImageBuffer::from_fn(w, h, |x, y| image::Luma([(at(x, y) * 65535.0).round() as u16]))
+                            .save(&path)
+                            .unwrap();
                     } else {
-                        image::ImageBuffer::from_fn(w, h, |x, y| image::Luma([(at(x, y) * 255.0).round() as u8])).save(&path).unwrap();
+                        image::ImageBuffer::from_fn(w, h, |x, y| image::Luma([(at(x, y) * 255.0).round() as u8]))
+                            .save(&path)
+                            .unwrap();
                     }
                 }
             }
@@ -358,7 +366,9 @@ fn whole_frames_give_what_they_can() {
     let record = images.record();
     let (own, theirs) = (case(&record, "curtain-arcade", "classic"), case(&run, "curtain-arcade", "classic"));
     assert_eq!(own.source.as_ref().unwrap().shows, Shows::Ratio);
-    for (name, region) in [(MetricName::Contrast, None), (MetricName::ContrastError, None), (MetricName::Openness, Some(Region::All))] {
+    for (name, region) in
+        [(MetricName::Contrast, None), (MetricName::ContrastError, None), (MetricName::Openness, Some(Region::All))]
+    {
         let value = |c: &CaseRecord| c.metric(name, region).unwrap().value.unwrap();
         assert!((value(own) - value(theirs)).abs() < 1e-5, "{name:?}");
     }
@@ -388,7 +398,8 @@ fn a_curve_is_fitted_on_controls_and_undone() {
     assert!((curve.exponent - 2.0).abs() < 0.1 && (curve.gain - 1.0).abs() < 0.02, "{curve:?}");
     assert_eq!(curve.scenes, ["corner"]);
     let run = Record::read(&world().join("run")).unwrap();
-    let value = |r: &Record| case(r, "curtain-arcade", "classic").metric(MetricName::Contrast, None).unwrap().value.unwrap();
+    let value =
+        |r: &Record| case(r, "curtain-arcade", "classic").metric(MetricName::Contrast, None).unwrap().value.unwrap();
     assert!((value(&record) - value(&run)).abs() < 0.05);
     let (code, _) = images.score(&["--curve", "1,2"]);
     assert_eq!(code, 0);

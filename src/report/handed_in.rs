@@ -18,7 +18,10 @@ pub fn notes(record: &Record) -> Vec<String> {
             ),
             None => ", as it was declared".to_owned(),
         };
-        notes.push(format!("An intensity curve was undone, {:.3} times openness to the power {:.3}{fitted}.", c.gain, c.exponent));
+        notes.push(format!(
+            "An intensity curve was undone, {:.3} times openness to the power {:.3}{fitted}.",
+            c.gain, c.exponent
+        ));
     }
     notes.extend(by.warnings.iter().cloned());
     let of = |intervals: Intervals, shows: Option<Shows>| {
