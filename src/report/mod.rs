@@ -165,7 +165,9 @@ fn masked_q(layers: &Layers, image: &str) -> Result<[Vec<f32>; 2], ReportError> 
 fn draw_scene(folder: &Path, record: &Record, scene: &SceneRecord, gallery: &mut Gallery) -> Result<(), ReportError> {
     let read = |image: &str| Layers::read(&folder.join(image));
     let look = read(&scene.look)?;
-    for name in &record.suite.estimators {
+    // Of an estimator that is not ours there is no picture, and no converged image.
+    let is_ours = |name: &&String| record.suite.methods.contains_key(*name);
+    for name in record.suite.estimators.iter().filter(is_ours) {
         let values = layer(&look, &scene.look, &format!("openness-{name}"))?;
         let place = gallery.place(&pictures::of_estimator(&scene.name, LOOK, name));
         picture::openness(&values, look.resolution, 1, &place)?;
@@ -176,8 +178,9 @@ fn draw_scene(folder: &Path, record: &Record, scene: &SceneRecord, gallery: &mut
     let converged = read(&scene.image)?;
     let mut shown = BTreeMap::new();
     for name in &record.suite.estimators {
-        let values = match smoothed(record, scene, name) {
+        let values = match shown_instead(record, scene, name) {
             Some(image) => layer(&read(image)?, image, "mean")?,
+            None if record.handed_in.is_some() => continue,
             None => layer(&converged, &scene.image, &format!("converged-{name}"))?,
         };
         let (middle, size) = middle(scene, &values);
@@ -210,7 +213,8 @@ fn against_judge(
         let pair = error_maps::Pair { test, reference: &q, image: &judge.image };
         let place = gallery.place(&pictures::of_estimator(&scene.name, MINUS_Q, name));
         error_maps::write(scene, &pair, error_maps::LIMIT_Q, &place)?;
-        let Some(case) = error_maps::fewest(record, scene, name) else { continue };
+        let is_ours = record.suite.methods.contains_key(*name);
+        let Some(case) = error_maps::fewest(record, scene, name).filter(|_| is_ours) else { continue };
         let reference = &layer(converged, &scene.image, &format!("converged-{name}"))?;
         let pair = error_maps::Pair { test: &error_maps::mean(folder, case)?, reference, image: &scene.image };
         let place = gallery.place(&pictures::of_estimator(&scene.name, MINUS_CONVERGED, name));
@@ -220,11 +224,13 @@ fn against_judge(
     Ok(picture::openness(&q, size, 4, &gallery.place(&pictures::q(&scene.name)))?)
 }
 
-/// The image of a smoothed method, of the most rays, whose mean over replicates shows
-/// what its converged image, which is not smoothed, does not. None for others.
-fn smoothed<'a>(record: &'a Record, scene: &SceneRecord, method: &str) -> Option<&'a str> {
-    let file = record.suite.methods.get(method)?;
-    if file.temporal.is_none() && file.denoise.is_none() {
+/// The image of the most rays whose mean over replicates is shown in place of the converged
+/// image: of a smoothed method, whose converged image is not smoothed, and of images that
+/// were handed in. None for others.
+fn shown_instead<'a>(record: &'a Record, scene: &SceneRecord, method: &str) -> Option<&'a str> {
+    let file = record.suite.methods.get(method);
+    let is_smoothed = file.is_some_and(|f| f.temporal.is_some() || f.denoise.is_some());
+    if !is_smoothed && record.handed_in.is_none() {
         return None;
     }
     let own = record.cases.iter().filter(|c| c.case.scene == scene.name && c.case.estimator == method);
