@@ -83,3 +83,16 @@ fn page(manifest: &Manifest) -> Result<String, Error> {
     environment.add_filter("text", |text: String| crate::untrusted::markdown(&text));
     environment.render_str(include_str!("README.md.j2"), Serde(manifest))
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::{intake::SELF_CHECK, scenes::Scene};
+
+    /// The page says them outright.
+    #[test]
+    fn the_self_check_is_as_the_page_says() {
+        let scene = Scene::from_toml("self-check", "self-check.toml", SELF_CHECK, None).unwrap();
+        assert_eq!((scene.measure.resolution, scene.ao.radius), ([160, 120], 0.5));
+        assert!(include_str!("README.md.j2").contains("160 x 120 pixels, R = 0.5 m"));
+    }
+}
