@@ -4,7 +4,7 @@ blender -b --factory-startup -noaudio --python-exit-code 1 --python adapters/ble
     SCENE.glb views.json OUTPUT.exr RAYS SEED RADIUS [--estimator classic|path-traced]
 
 Blender 3.4 or newer, on the CPU. Writes one 32-bit channel, Y, linear, rows from the top, sampled at the pixels' centres
-(Cycles' smallest filter: a hundredth of a pixel).
+to 0.004 pixels, through Cycles' smallest filter, a hundredth of a pixel.
 
 classic: Cycles' ambient occlusion node: share of cosine-weighted rays about the geometric normal, both sides of every
 triangle, with no hit within RADIUS. path-traced: irradiance over pi (luminance, Rec. 709), with all bounces.
@@ -22,6 +22,9 @@ sys.path.append(str(Path(__file__).resolve().parent))
 from aogauge_kit import LUMINANCE, Kit, arguments, read_glb, write_exr
 
 MOST_OF_NODE = 128  # rays that the ambient occlusion node casts for one sample, at most
+# How far beside the pixels' centres rays start, in pixels. Cycles skips the triangle that a ray leaves, but not its neighbour:
+# from a centre that lies on the edge of two, as on a square's diagonal, all of a hemisphere is closed.
+BESIDE = (0.003, 0.002)
 BOUNCES = 1024  # Cycles' largest; Russian roulette ends paths long before
 
 
@@ -105,9 +108,11 @@ def camera(measure):
     data.ortho_scale = 2 * measure["half_size"][0]
     data.clip_start, data.clip_end = 1e-6, 1e4
     up, back = Vector(measure["up"]), Vector(measure["normal"])
+    across = up.cross(back)
     place = Vector(measure["center"]) + measure["clearance"] * back
+    place += measure["pixel"] * (BESIDE[0] * across + BESIDE[1] * up)
     made = add("measure", data)
-    made.matrix_world = frame(up.cross(back), up, back, place)
+    made.matrix_world = frame(across, up, back, place)
     bpy.context.scene.camera = made
     render = bpy.context.scene.render
     render.resolution_x, render.resolution_y = measure["resolution"]
