@@ -2,8 +2,18 @@
 
 use super::{Exit, Failure, explain::Explanations, golden, json, print};
 use crate::{
-    bench::GpuBench, changes::Changes, compare::Comparison, flatland::Study, golden::Verification, record::Record,
-    report::digest::Digest, run::ShardRecord, scenes::Scene, suite::SuiteFile,
+    bench::GpuBench,
+    changes::Changes,
+    compare::Comparison,
+    flatland::Study,
+    golden::Verification,
+    kit::Manifest,
+    record::Record,
+    report::digest::Digest,
+    run::{ReferencesFile, ShardRecord},
+    scenes::Scene,
+    score::Declaration,
+    suite::SuiteFile,
 };
 use clap::ValueEnum;
 
@@ -27,6 +37,12 @@ enum Of {
     Suite,
     /// Scene files.
     Scene,
+    /// kit.json, what `scene export --suite` says for programs.
+    Kit,
+    /// scoring.json, what images are scored against.
+    Scoring,
+    /// score.toml, what is declared of images.
+    Score,
     /// flatland.json
     Flatland,
     /// bench.json
@@ -53,6 +69,9 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
         Of::Shard => schemars::schema_for!(ShardRecord),
         Of::Suite => schemars::schema_for!(SuiteFile),
         Of::Scene => Scene::file_schema(),
+        Of::Kit => schemars::schema_for!(Manifest),
+        Of::Scoring => schemars::schema_for!(ReferencesFile),
+        Of::Score => schemars::schema_for!(Declaration),
         Of::Flatland => schemars::schema_for!(Study),
         Of::Compare => schemars::schema_for!(Comparison),
         Of::Explain => schemars::schema_for!(Explanations),

@@ -119,6 +119,10 @@ impl Declaration {
     pub fn check(&self) -> Result<(), String> {
         if let Some(name) = &self.renderer {
             aogauge_scenes::check_name(name).map_err(|e| format!("renderer: {e}"))?;
+            // A record that calls somebody's images those of our CPU would be believed.
+            if ["cpu", "gpu", "auto"].contains(&name.to_ascii_lowercase().as_str()) {
+                return Err(format!("renderer is '{name}', the name of one of aogauge's own: give it another"));
+            }
         }
         if let Some(name) = &self.estimator {
             aogauge_scenes::check_name(name).map_err(|e| format!("estimator: {e}"))?;
@@ -162,6 +166,7 @@ mod tests {
         for (text, says) in [
             ("rays = 0", "rays is 0: it must be 1 to 65536"),
             ("renderer = '../x'", "renderer: "),
+            ("renderer = 'CPU'", "the name of one of aogauge's own"),
             ("estimator = ''", "estimator: "),
             ("curve = { gain = 0, exponent = 1 }", "curve.gain is 0: it must be 0.000001 to 100"),
             ("curve = { gain = 1, exponent = nan }", "curve.exponent is NaN"),

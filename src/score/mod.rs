@@ -105,7 +105,7 @@ fn name_of(folder: &Path) -> String {
     let legal: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(64).collect();
     match aogauge_scenes::check_name(&legal) {
         // The names of our own renderers are not free.
-        Ok(()) if legal != "cpu" && legal != "gpu" => legal,
+        Ok(()) if !["cpu", "gpu", "auto"].contains(&legal.to_ascii_lowercase().as_str()) => legal,
         _ => "handed-in".to_owned(),
     }
 }
