@@ -298,6 +298,9 @@ fn what_is_wrong_with_a_case_is_named() {
     let name = "corner.classic.4.0000.exr";
     check("a view of", &|images| images.exr(name, &first[..first.len() / 2], [size[0], size[1] / 2]));
     check("inverted", &|images| images.exr(name, &first.iter().map(|v| 1.0 - v).collect::<Vec<_>>(), size));
+    // One of several is enough.
+    let last = "corner.classic.4.0003.exr";
+    check("image 3: inverted", &|images| images.exr(last, &first.iter().map(|v| 1.0 - v).collect::<Vec<_>>(), size));
     check("NaN", &|images| {
         let mut hole = first.clone();
         hole[size[0] as usize + 3] = f32::NAN;
@@ -384,6 +387,11 @@ fn whole_frames_give_what_they_can() {
     assert_eq!(own.source.as_ref().unwrap().shows, Shows::Frame);
     let names: Vec<MetricName> = own.metrics.iter().map(|m| m.name).collect();
     assert_eq!(names, [MetricName::Contrast, MetricName::Michelson]);
+    // A frame without a number is none.
+    let nothing = Images::new();
+    nothing.exr("curtain-arcade.classic.4.0000.frame.exr", &vec![f32::NAN; replicates[0].len()], size);
+    let (code, text) = nothing.score(&["--partial"]);
+    assert!(code == 5 && text.contains("holds a number"), "{code}: {text}");
     let report = fs::read_to_string(lone.out().join("report.md")).unwrap();
     assert!(report.contains("cannot be known"), "{report}");
 }

@@ -64,7 +64,7 @@ pub enum Fit {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct KnownCurve {
-    /// Above 0, at most 100.
+    /// Above 0, at most 1000.
     pub gain: f64,
     /// 0.1 to 10.
     pub exponent: f64,
@@ -131,7 +131,7 @@ impl Declaration {
             return Err(format!("rays is {rays}: it must be 1 to 65536"));
         }
         if let Some(CurveChoice::Known(curve)) = &self.curve {
-            for (field, value, range) in [("gain", curve.gain, 1e-6..=100.0), ("exponent", curve.exponent, 0.1..=10.0)]
+            for (field, value, range) in [("gain", curve.gain, 1e-6..=1000.0), ("exponent", curve.exponent, 0.1..=10.0)]
             {
                 if !range.contains(&value) {
                     return Err(format!("curve.{field} is {value}: it must be {} to {}", range.start(), range.end()));
@@ -168,7 +168,7 @@ mod tests {
             ("renderer = '../x'", "renderer: "),
             ("renderer = 'CPU'", "the name of one of aogauge's own"),
             ("estimator = ''", "estimator: "),
-            ("curve = { gain = 0, exponent = 1 }", "curve.gain is 0: it must be 0.000001 to 100"),
+            ("curve = { gain = 0, exponent = 1 }", "curve.gain is 0: it must be 0.000001 to 1000"),
             ("curve = { gain = 1, exponent = nan }", "curve.exponent is NaN"),
             ("curve = 'fitted'", "curve must be \"fit\""),
             ("means = 'ao'", "openness"),

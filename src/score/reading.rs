@@ -153,10 +153,20 @@ impl Reader<'_> {
         let size = scene.facts.resolution.map(|side| side as usize);
         let mut wrong = Vec::new();
         let mut doubtful = Vec::new();
-        for finding in images.first().map(|image| intake::diagnose(image, &reference, size)).unwrap_or_default() {
-            let is_declared = matches!(finding, Finding::Encoded { .. }) && self.declared.encoding.is_some();
-            let is_doubt = matches!(finding, Finding::Curve { .. } | Finding::Shifted { .. }) || is_declared;
-            if is_doubt { doubtful.push(finding.to_string()) } else { wrong.push(finding.to_string()) }
+        for (number, image) in images.iter().enumerate() {
+            for finding in intake::diagnose(image, &reference, size) {
+                let is_declared = matches!(finding, Finding::Encoded { .. }) && self.declared.encoding.is_some();
+                let is_doubt = matches!(finding, Finding::Curve { .. } | Finding::Shifted { .. }) || is_declared;
+                // What is doubtful is so in all of them.
+                if is_doubt && number == 0 {
+                    doubtful.push(finding.to_string());
+                } else if !is_doubt {
+                    wrong.push(format!("image {number}: {finding}"));
+                }
+            }
+            if !wrong.is_empty() {
+                break;
+            }
         }
         if let Some(source) = &mut case.source {
             source.warnings.extend(doubtful);
