@@ -323,6 +323,12 @@ fn a_part_may_be_scored_and_nothing_is_not() {
     assert_eq!(images.score(&[]).0, 5);
     let (code, text) = images.score(&["--partial"]);
     assert_eq!(code, 0, "{text}");
+    // A slip in a name is not passed over.
+    let slip = Images::new();
+    slip.all(|_, image, _| image.to_vec());
+    slip.exr("corner.extendet.4.0000.exr", &replicates[0], size);
+    let (code, text) = slip.score(&[]);
+    assert!(code == 2 && text.contains("extendet") && text.contains("--partial"), "{code}: {text}");
     let empty = Images::new();
     let (code, text) = empty.score(&[]);
     assert!(code == 4 && text.contains("SCENE.ESTIMATOR.RAYS.REPLICATE.exr"), "{text}");

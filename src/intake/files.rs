@@ -35,6 +35,8 @@ pub struct Files {
     /// What whoever handed them in should know, one sentence each: files that are not
     /// taken, numbers that are missing.
     pub warnings: Vec<String>,
+    /// Images that are not taken, because their names do not say what they are.
+    pub not_taken: usize,
 }
 
 /// The images of one case: a scene, an estimator and a number of rays.
@@ -201,6 +203,7 @@ impl<'a> Intake<'a> {
             }
             names.join(", ")
         };
+        files.not_taken = self.unknown.values().map(Vec::len).sum();
         for (why, paths) in &self.unknown {
             let why = untrusted::line(why);
             files.warnings.push(format!(

@@ -40,6 +40,9 @@ pub enum ScoreError {
     /// There is no image of the kit's scenes.
     #[error("{0}")]
     Nothing(String),
+    /// Some images are of nobody knows what.
+    #[error("{0}")]
+    NotTaken(String),
     /// No curve can be found.
     #[error("{0}")]
     Curve(String),
@@ -55,7 +58,8 @@ pub struct Gathered {
 }
 
 /// Reads the images of a folder. Where a scene of the kit has no image of an estimator and
-/// ray count that other scenes have, its case ends with an error, unless `is_partial`.
+/// ray count that other scenes have, its case ends with an error, and images whose names say nothing known are an error,
+/// unless `is_partial`.
 ///
 /// # Errors
 /// [`ScoreError`]; what is wrong with the images of one case ends that case alone.
@@ -84,6 +88,14 @@ pub fn gather(
             "{}: no image is called like a scene of the kit{what}; names are SCENE.ESTIMATOR.RAYS.REPLICATE.exr, the \
              scenes {scenes}",
             folder.display()
+        )));
+    }
+    // A slip in a name must not leave out what was to be judged.
+    if found.not_taken > 0 && !is_partial {
+        return Err(ScoreError::NotTaken(format!(
+            "{} images are {}; an estimator that the kit does not have is named by --estimator; --partial leaves them out",
+            found.not_taken,
+            warnings.join("; ")
         )));
     }
     let mut cases: Vec<CaseImages> = handed.iter().map(|h| reader.case(h, &renderer)).collect();
