@@ -5,15 +5,13 @@ adapters, and compares means over regions and over tiles of 16 x 16 pixels by We
 correction over all tests of a program. Writes ao.md and ao.svg; ends with 1 where a test rejects.
 """
 
-import argparse
 import sys
-from pathlib import Path
 
 import matplotlib
 import numpy as np
 from scipy import stats
 
-from peer_images import Aogauge, Cycles, Kit, Mitsuba, kept
+from peer_images import Cycles, Mitsuba, arguments, kept
 
 matplotlib.use("svg")
 import matplotlib.pyplot as plt
@@ -123,12 +121,7 @@ def plot(peers, kits, results, path):
 
 
 def main():
-    arguments = argparse.ArgumentParser(description=__doc__)
-    arguments.add_argument("kits", nargs="+", type=Kit)
-    arguments.add_argument("--aogauge", required=True, type=Aogauge)
-    arguments.add_argument("--out", required=True, type=Path)
-    arguments.add_argument("--images", type=Path, help="where rendered images are kept, and taken from")
-    args = arguments.parse_args()
+    args = arguments(__doc__)
     peers = {"Cycles": Cycles(), "Mitsuba": Mitsuba()}
     results = {program: {} for program in peers}
     for kit in args.kits:

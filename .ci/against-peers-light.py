@@ -5,17 +5,15 @@ with the shipped adapters, and compares irradiance over pi along the transect. W
 profiles.svg; ends with 1 where a bin differs too much.
 """
 
-import argparse
 import itertools
 import math
 import sys
 import time
-from pathlib import Path
 
 import matplotlib
 import numpy as np
 
-from peer_images import Aogauge, Cycles, Kit, Mitsuba, kept
+from peer_images import Cycles, Mitsuba, arguments, kept
 
 matplotlib.use("svg")
 import matplotlib.pyplot as plt
@@ -229,12 +227,7 @@ def levels(axis, place, bins, colour, mark, label):
 
 
 def main():
-    arguments = argparse.ArgumentParser(description=__doc__)
-    arguments.add_argument("kits", nargs="+", type=Kit)
-    arguments.add_argument("--aogauge", required=True, type=Aogauge)
-    arguments.add_argument("--out", required=True, type=Path)
-    arguments.add_argument("--images", type=Path, help="where rendered images are kept, and taken from")
-    args = arguments.parse_args()
+    args = arguments(__doc__)
     peers = {"Cycles": Cycles(), "Mitsuba": Mitsuba()}
     results = {kit.name: compare(kit, peers, args.aogauge, args.images) for kit in args.kits}
     lines = [

@@ -4,6 +4,7 @@ Run by Blender (blender -b --python .ci/peer_images.py -- KIT TWIN ESTIMATOR RAY
 with the shipped adapter, one process for all seeds.
 """
 
+import argparse
 import importlib.util
 import json
 import subprocess
@@ -57,6 +58,16 @@ class Kit:
         """Masks by name, of those that are not empty."""
         masks = {label.removesuffix(".Y"): mask > 0 for label, mask in read_exr(self.path / "regions.exr").items()}
         return {name: masks[name] for name in REGIONS if masks[name].any()}
+
+
+def arguments(description):
+    """Those of a check that holds aogauge against its peers."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("kits", nargs="+", type=Kit)
+    parser.add_argument("--aogauge", required=True, type=Aogauge)
+    parser.add_argument("--out", required=True, type=Path)
+    parser.add_argument("--images", type=Path, help="where rendered images are kept, and taken from")
+    return parser.parse_args()
 
 
 def read_exr(path):

@@ -1,6 +1,7 @@
 //! Files that are whole or not there at all: writes go to a temporary name in the
 //! same folder, then are renamed.
 
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::{
     fs,
     io::{self, BufWriter, Write},
@@ -74,6 +75,36 @@ const PART: [&str; 2] = [".aogauge-", ".part"];
 /// Whether a file is one that [`write_whole`] was writing when it was killed.
 pub fn is_part(name: &str) -> bool {
     name.starts_with(PART[0]) && name.ends_with(PART[1])
+}
+
+/// Writes a value as JSON, indented, by [`write_whole`]; `what` it is, in errors.
+///
+/// # Errors
+/// Where it is no JSON, or as [`write_whole`].
+pub(crate) fn write_json(path: &Path, value: &impl Serialize, what: &str) -> Result<(), DiskError> {
+    let text = serde_json::to_string_pretty(value)
+        .map_err(|e| DiskError::content(path, format!("{what} cannot be written: {e}")))?;
+    write_whole(path, |buffer| buffer.write_all(format!("{text}\n").as_bytes()))
+}
+
+/// Reads JSON of one version, which is told from others before all of it is read. In errors
+/// it is not `what` ("a shard"), or of another version than `it_is` ("it is a shard") says.
+///
+/// # Errors
+/// Where it cannot be read, is malformed or of another version.
+pub(crate) fn read_json<T: DeserializeOwned>(path: &Path, reads: u32, what: &str, it_is: &str) -> Result<T, DiskError> {
+    #[derive(Deserialize)]
+    struct Versioned {
+        version: u32,
+    }
+    let text = read_text(path)?;
+    let malformed = |e: serde_json::Error| DiskError::content(path, format!("not {what}: {e}"));
+    let Versioned { version } = serde_json::from_str(&text).map_err(malformed)?;
+    if version != reads {
+        let why = format!("{it_is} of version {version}, this tool reads version {reads}");
+        return Err(DiskError::content(path, why));
+    }
+    serde_json::from_str(&text).map_err(malformed)
 }
 
 /// Reads a text file.

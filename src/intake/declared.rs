@@ -74,6 +74,36 @@ pub enum Upsample {
     Bilinear,
 }
 
+impl Means {
+    /// As it is written in `score.toml`.
+    pub fn label(self) -> &'static str {
+        match self {
+            Means::Openness => "openness",
+            Means::Occlusion => "occlusion",
+        }
+    }
+}
+
+impl Rows {
+    /// As it is written in `score.toml`.
+    pub fn label(self) -> &'static str {
+        match self {
+            Rows::Top => "top",
+            Rows::Bottom => "bottom",
+        }
+    }
+}
+
+impl Upsample {
+    /// As it is written in `score.toml`.
+    pub fn label(self) -> &'static str {
+        match self {
+            Upsample::Nearest => "nearest",
+            Upsample::Bilinear => "bilinear",
+        }
+    }
+}
+
 impl Share {
     /// All of them.
     pub const ALL: [Share; 3] = [Share::Full, Share::Half, Share::Quarter];

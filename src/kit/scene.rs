@@ -22,9 +22,6 @@ pub enum KitError {
     /// What images are scored against cannot be made.
     #[error(transparent)]
     Run(#[from] crate::run::RunError),
-    /// What was written cannot be read.
-    #[error(transparent)]
-    References(#[from] crate::run::ReferencesError),
     /// The scene cannot be traced.
     #[error("scene '{scene}': {source}")]
     Render {

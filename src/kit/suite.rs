@@ -6,9 +6,9 @@ use super::{
     scene, self_check,
 };
 use crate::{
-    disk::{DiskError, write_whole},
+    disk::{DiskError, write_json, write_whole},
     record::RecordFolder,
-    run::{Means, Observer, Prepared, References},
+    run::{Means, Observer, Prepared},
     suite::Suite,
 };
 use minijinja::{Environment, Error, syntax::SyntaxConfig, value::Serde};
@@ -57,21 +57,17 @@ pub fn write_suite(
     let plan =
         format!("{}\n{}\n", prepared.identity(&means.machine), crate::judge_cache::program().unwrap_or_default());
     let work = RecordFolder::resume(&folder.join(WORK), &plan)?;
-    prepared.write_references(means, &work, &folder.join(SCORING), observer)?;
+    let references = prepared.write_references(means, &work, &folder.join(SCORING), observer)?;
     for scene in &suite.scenes {
         scene::write(scene, &folder.join(SCENES).join(&scene.name))?;
     }
     self_check::write(prepared.seed(), &folder.join(SCENES), &folder.join(SCORING))?;
-    let references = References::read(&folder.join(SCORING))?;
-    let scenes = references.file().scenes.iter();
-    let manifest = Manifest::new(suite, scenes.map(|s| ManifestScene::new(SCENES, s.facts.clone())).collect());
+    let scenes = references.scenes.into_iter();
+    let manifest = Manifest::new(suite, scenes.map(|s| ManifestScene::new(SCENES, s.facts)).collect());
     let path = folder.join("README.md");
     let page = page(&manifest).map_err(|e| DiskError::content(&path, format!("the page cannot be made: {e}")))?;
     write_whole(&path, |out| out.write_all(page.as_bytes()))?;
-    let path = folder.join("kit.json");
-    let text = serde_json::to_string_pretty(&manifest)
-        .map_err(|e| DiskError::content(&path, format!("it cannot be written: {e}")))?;
-    write_whole(&path, |out| out.write_all(format!("{text}\n").as_bytes()))?;
+    write_json(&folder.join("kit.json"), &manifest, "it")?;
     drop(work);
     let work = folder.join(WORK);
     Ok(fs::remove_dir_all(&work).map_err(DiskError::io(&work, "remove what the export alone needed"))?)

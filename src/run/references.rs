@@ -14,7 +14,7 @@ use super::{
     unit::{CONVERGED_REPLICATES, Unit},
 };
 use crate::{
-    disk::{DiskError, read_text, write_whole},
+    disk::{DiskError, read_json, read_text, write_json, write_whole},
     layers::Layers,
     metrics::{
         artifact::Converged,
@@ -114,7 +114,7 @@ pub(super) struct Loaded {
 }
 
 impl Prepared<'_> {
-    /// Renders the references of a plan and writes them into a folder. `work` holds what is
+    /// Renders the references of a plan and writes them into a folder. Returns the list of them. `work` holds what is
     /// done, so that an unfinished one can go on.
     ///
     /// # Errors
@@ -125,7 +125,7 @@ impl Prepared<'_> {
         work: &RecordFolder,
         folder: &Path,
         observer: &dyn Observer,
-    ) -> Result<(), RunError> {
+    ) -> Result<ReferencesFile, RunError> {
         let cost = self.sets.iter().flat_map(|s| all_but_cases(s).into_iter().map(|u| super::step(s, &u).rays)).sum();
         let progress = Progress::new(observer, cost);
         let mut scenes = Vec::new();
@@ -171,10 +171,8 @@ impl Prepared<'_> {
         let text = toml::to_string_pretty(&without_programs(&self.plan.suite.file))
             .map_err(|e| DiskError::content(&path, format!("the suite cannot be written: {e}")))?;
         write_whole(&path, |buffer| buffer.write_all(text.as_bytes()))?;
-        let path = folder.join(FILE);
-        let text = serde_json::to_string_pretty(&file)
-            .map_err(|e| DiskError::content(&path, format!("the references cannot be written: {e}")))?;
-        Ok(write_whole(&path, |buffer| buffer.write_all(format!("{text}\n").as_bytes()))?)
+        write_json(&folder.join(FILE), &file, "the references")?;
+        Ok(file)
     }
 }
 
@@ -248,18 +246,7 @@ impl References {
             );
             return Err(DiskError::content(given, why).into());
         }
-        let text = read_text(&path)?;
-        #[derive(Deserialize)]
-        struct Versioned {
-            version: u32,
-        }
-        let malformed = |e: serde_json::Error| DiskError::content(&path, format!("not a list of references: {e}"));
-        let Versioned { version } = serde_json::from_str(&text).map_err(malformed)?;
-        if version != VERSION {
-            let why = format!("they are references of version {version}, this tool reads version {VERSION}");
-            return Err(DiskError::content(&path, why).into());
-        }
-        let file: ReferencesFile = serde_json::from_str(&text).map_err(malformed)?;
+        let file: ReferencesFile = read_json(&path, VERSION, "a list of references", "they are references")?;
         for scene in &file.scenes {
             scene.check().map_err(|why| DiskError::content(&path, why))?;
         }

@@ -9,7 +9,7 @@ use super::{
     judging::{Judged, Unjudged},
     measuring::Counts,
     references::{References, SceneReferences},
-    rendering::{Images, Rendered, case_layers, moments},
+    rendering::{Images, Rendered, case_layers},
     set::measured,
     subject::Subject,
 };
@@ -114,10 +114,11 @@ impl Ready<'_> {
             let judged = subject.judge(folder, &rendered)?;
             let scored = Scored { subject: &subject, judged: &judged, handed: &own };
             for handed in &own {
-                let record = scored.case(handed, &rendered);
+                let mut record = scored.case(handed, &rendered);
                 if let (None, Ok(images)) = (&record.error, &handed.images) {
-                    case_layers(subject.facts.resolution, &handed.case, images, None)
-                        .write(&folder.path().join(case_image(&handed.case)))?;
+                    let layers = case_layers(subject.facts.resolution, &handed.case, images, None);
+                    record.hash = layers.get("mean").map(pixel_hash);
+                    layers.write(&folder.path().join(case_image(&handed.case)))?;
                 }
                 cases.push(record);
             }
@@ -168,6 +169,7 @@ struct Scored<'a> {
 }
 
 impl Scored<'_> {
+    /// What is found in a case; the hash of its image is not.
     fn case(&self, handed: &CaseImages, rendered: &Rendered) -> CaseRecord {
         let failed =
             |why: String| CaseRecord { source: handed.source.clone(), ..CaseRecord::failed(&handed.case, why) };
@@ -208,21 +210,24 @@ impl Scored<'_> {
             }
             _ => measure(images, &known),
         };
-        let mut record = CaseRecord::failed(&handed.case, String::new());
-        record.error = None;
-        record.image = Some(case_image(&handed.case));
-        record.hash = Some(pixel_hash(&moments(images, self.subject.facts.pixels()).0));
-        record.metrics = metrics;
-        record.replicates = Some(images.len() as u32);
-        record.source = handed.source.clone();
-        if shows == Shows::Openness && !is_one {
-            let method = measured(images, converged, &known);
-            let classic = self.classic(&handed.case, images.len());
-            let classic_on =
-                |regions| Some(measured(classic?.images.as_ref().ok()?, self.classic_truth(rendered)?, regions));
-            record.occluders = self.subject.by_occluder(index, &method, &classic_on, self.judged);
+        let occluders = if shows == Shows::Openness && !is_one {
+            let classic = |regions| self.classic_on(&handed.case, images.len(), regions, rendered);
+            self.subject.by_occluder(index, &measured(images, converged, &known), &classic, self.judged)
+        } else {
+            Vec::new()
+        };
+        CaseRecord {
+            case: handed.case.clone(),
+            error: None,
+            image: Some(case_image(&handed.case)),
+            hash: None,
+            metrics,
+            looks: None,
+            replicates: Some(images.len() as u32),
+            log: None,
+            source: handed.source.clone(),
+            occluders,
         }
-        record
     }
 
     /// Every metric over some regions.
@@ -242,10 +247,7 @@ impl Scored<'_> {
         }
         let index = self.subject.method(case);
         let is_classic = self.subject.plan.suite.methods[self.subject.plan.suite.classic()].name == case.estimator;
-        let classic = self.classic(case, images.len()).filter(|_| !is_classic);
-        let beside = classic.zip(self.classic_truth(rendered)).and_then(|(classic, truth)| {
-            Some(Measured { replicates: classic.images.as_ref().ok()?, converged: truth, regions })
-        });
+        let beside = if is_classic { None } else { self.classic_on(case, images.len(), regions, rendered) };
         let lacks_classic = beside.is_none() && !is_classic;
         let others = Others {
             classic: beside,
@@ -272,23 +274,25 @@ impl Scored<'_> {
 
     /// The images of classic AO that a case is compared with: as many, of the same renderer;
     /// of as many rays, else of the most.
-    fn classic(&self, case: &Case, replicates: usize) -> Option<&CaseImages> {
-        let classic = &self.subject.plan.suite.methods[self.subject.plan.suite.classic()].name;
-        let is_openness = |h: &&&CaseImages| h.source.as_ref().is_none_or(|s| s.shows == Shows::Openness);
-        let theirs = self.handed.iter().filter(|h| h.case.estimator == *classic).filter(is_openness);
-        let as_many = theirs.filter(|h| h.images.as_ref().is_ok_and(|i| i.len() == replicates));
-        as_many.max_by_key(|h| (h.case.rays == case.rays, h.case.rays)).copied()
-    }
-
-    fn classic_truth<'r>(&self, rendered: &'r Rendered) -> Option<&'r Converged> {
-        rendered.truths.get(&self.subject.plan.suite.classic()).map(|t| &t.converged)
+    fn classic_on<'r>(
+        &'r self,
+        case: &Case,
+        replicates: usize,
+        regions: &'r Regions,
+        rendered: &'r Rendered,
+    ) -> Option<Measured<'r>> {
+        let suite = self.subject.plan.suite;
+        let index = suite.classic();
+        let theirs = self.handed.iter().filter(|h| h.case.estimator == suite.methods[index].name && h.is_openness());
+        let as_many = theirs.filter_map(|h| Some((&h.case, h.images.as_ref().ok().filter(|i| i.len() == replicates)?)));
+        let (_, images) = as_many.max_by_key(|(own, _)| (own.rays == case.rays, own.rays))?;
+        Some(measured(images, &rendered.truths.get(&index)?.converged, regions))
     }
 
     /// Puts images of openness where profiles and convergence are taken from.
     fn note(&self, rendered: &mut Rendered) {
         for handed in self.handed {
-            let shows = handed.source.as_ref().map_or(Shows::Openness, |s| s.shows);
-            if let (Ok(replicates), Shows::Openness) = (&handed.images, shows) {
+            if let (Ok(replicates), true) = (&handed.images, handed.is_openness()) {
                 let images = Images { replicates: replicates.clone(), hash: String::new(), seconds: 0.0, retries: 0 };
                 rendered.images.insert(handed.case.id(), Ok(images));
             }

@@ -9,13 +9,13 @@ use super::{
     timing,
 };
 use crate::{
-    disk::{DiskError, read_text, write_whole},
+    disk::{DiskError, read_json, write_json},
     record::{Budget, Machine, RecordFolder, SHARD, Undecided},
     suite::Platform,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::{fmt, io::Write, path::Path, str::FromStr, time::Instant};
+use std::{fmt, path::Path, str::FromStr, time::Instant};
 
 /// Version of the format of `shard.json`.
 const VERSION: u32 = 2;
@@ -176,18 +176,7 @@ impl ShardRecord {
                 format!("there is no {SHARD} here: not a shard, or it did not finish"),
             ));
         }
-        let text = read_text(&path)?;
-        #[derive(Deserialize)]
-        struct Versioned {
-            version: u32,
-        }
-        let malformed = |e: serde_json::Error| DiskError::content(&path, format!("not a shard: {e}"));
-        let Versioned { version } = serde_json::from_str(&text).map_err(malformed)?;
-        if version != VERSION {
-            let why = format!("it is a shard of version {version}, this tool reads version {VERSION}");
-            return Err(DiskError::content(&path, why));
-        }
-        serde_json::from_str(&text).map_err(malformed)
+        read_json(&path, VERSION, "a shard", "it is a shard")
     }
 }
 
@@ -256,10 +245,7 @@ impl Prepared<'_> {
                 format!("{}: {what}", early.as_deref().unwrap_or("it ended early"))
             }),
         };
-        let path = folder.path().join(SHARD);
-        let text = serde_json::to_string_pretty(&record)
-            .map_err(|e| DiskError::content(&path, format!("the shard cannot be written: {e}")))?;
-        write_whole(&path, |buffer| buffer.write_all(format!("{text}\n").as_bytes()))?;
+        write_json(&folder.path().join(SHARD), &record, "the shard")?;
         Ok(record)
     }
 }

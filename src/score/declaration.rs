@@ -4,6 +4,7 @@ use crate::{
     disk::{DiskError, read_text},
     intake::{Declared, Means, Rows, Share, Upsample},
     metrics::image::Encoding,
+    suite::is_taken,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -120,7 +121,7 @@ impl Declaration {
         if let Some(name) = &self.renderer {
             aogauge_scenes::check_name(name).map_err(|e| format!("renderer: {e}"))?;
             // A record that calls somebody's images those of our CPU would be believed.
-            if ["cpu", "gpu", "auto"].contains(&name.to_ascii_lowercase().as_str()) {
+            if is_taken(name) {
                 return Err(format!("renderer is '{name}', the name of one of aogauge's own: give it another"));
             }
         }

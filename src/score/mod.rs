@@ -13,7 +13,7 @@ use crate::{
     intake::{self, Defaults, IntakeError},
     record::{HandedIn, UndoneCurve},
     run::{CaseImages, References, ReferencesError},
-    suite::Case,
+    suite::{Case, is_taken},
 };
 use reading::Reader;
 use self_check::SCENE as SELF_CHECK;
@@ -117,7 +117,7 @@ fn name_of(folder: &Path) -> String {
     let legal: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(64).collect();
     match aogauge_scenes::check_name(&legal) {
         // The names of our own renderers are not free.
-        Ok(()) if !["cpu", "gpu", "auto"].contains(&legal.to_ascii_lowercase().as_str()) => legal,
+        Ok(()) if !is_taken(&legal) => legal,
         _ => "handed-in".to_owned(),
     }
 }
@@ -175,18 +175,19 @@ fn undo_curve(
 
 fn fit(cases: &[CaseImages], references: &References) -> Result<(intake::Curve, UndoneCurve), ScoreError> {
     let is_control = |scene: &str| references.scene(scene).is_some_and(|s| s.facts.control);
-    let mut pairs = Vec::new();
+    let mut known = Vec::new();
     let mut scenes = BTreeSet::new();
     for case in cases.iter().filter(|c| is_control(&c.case.scene) && c.is_openness()) {
         let Ok(images) = &case.images else { continue };
         if let Some(converged) = references.converged(&case.case.scene, &case.case.estimator)? {
             scenes.insert(case.case.scene.clone());
-            pairs.extend(images.iter().map(|image| (image.clone(), converged.mean.clone())));
+            known.push((images, converged.mean));
         }
     }
-    let slices: Vec<(&[f32], &[f32])> = pairs.iter().map(|(a, b)| (a.as_slice(), b.as_slice())).collect();
+    let pairs: Vec<(&[f32], &[f32])> =
+        known.iter().flat_map(|(images, mean)| images.iter().map(|i| (i.as_slice(), mean.as_slice()))).collect();
     let names = || scenes.iter().cloned().collect::<Vec<_>>();
-    let Some(curve) = intake::fit_curve(&slices) else {
+    let Some(curve) = intake::fit_curve(&pairs) else {
         let of = if scenes.is_empty() { "no control scene".to_owned() } else { names().join(", ") };
         return Err(ScoreError::Curve(format!(
             "no curve can be found on {of}: it takes images of several rays, of an estimator of the suite, in control scenes \

@@ -60,16 +60,14 @@ impl Reader<'_> {
     fn read_as(&self, shows: Shows, encoding: &str) -> String {
         let d = &self.declared;
         let what = match shows {
-            Shows::Openness => format!("{:?}", d.means).to_lowercase(),
+            Shows::Openness => d.means.label().to_owned(),
             Shows::Ratio => "a frame with AO over one without".to_owned(),
             Shows::Frame => "a whole frame".to_owned(),
         };
-        let rows = format!("{:?}", d.rows).to_lowercase();
+        let rows = d.rows.label();
         let scaled = match d.resolution {
             intake::Share::Full => String::new(),
-            share => {
-                format!(", {} resolution, upsampled {}", share.label(), format!("{:?}", d.upsample).to_lowercase())
-            }
+            share => format!(", {} resolution, upsampled {}", share.label(), d.upsample.label()),
         };
         format!("{what}, {encoding}, rows from the {rows}{scaled}")
     }
@@ -86,19 +84,21 @@ impl Reader<'_> {
                 read.warnings.push(text);
             }
         };
+        let reference = match shows {
+            Shows::Openness => self.reference(&handed.scene, &handed.estimator)?,
+            Shows::Ratio | Shows::Frame => Reference::default(),
+        };
         for image in &handed.images {
             match (shows, &image.without) {
                 (Shows::Openness, _) => {
-                    let reference = self.reference(&handed.scene, &handed.estimator)?;
                     let taken = intake::read_against(&image.path, &self.declared, view, &reference)?;
                     taken.warnings.into_iter().for_each(|w| warn(&image.path, w));
                     read.encoding = taken.encoding.label().to_owned();
                     read.images.extend(taken.replicates);
                 }
                 (Shows::Ratio, Some(without)) => {
-                    let frames = [&image.path, without].map(|p| intake::frame(p, &self.declared, view));
-                    let [with, without] = frames;
-                    let (with, without) = (with?, without?);
+                    let frame = |path| intake::frame(path, &self.declared, view);
+                    let (with, without) = (frame(&image.path)?, frame(without)?);
                     let ratio = intake::ratio(&with, &without)?;
                     read.encoding = with.encoding.label().to_owned();
                     with.warnings.into_iter().chain(without.warnings).for_each(|w| warn(&image.path, w));
@@ -156,7 +156,7 @@ impl Reader<'_> {
         for (number, image) in images.iter().enumerate() {
             for finding in intake::diagnose(image, &reference, size) {
                 let is_declared = matches!(finding, Finding::Encoded { .. }) && self.declared.encoding.is_some();
-                let is_doubt = matches!(finding, Finding::Curve { .. } | Finding::Shifted { .. }) || is_declared;
+                let is_doubt = finding.is_doubt() || is_declared;
                 // What is doubtful is so in all of them.
                 if is_doubt && number == 0 {
                     doubtful.push(finding.to_string());

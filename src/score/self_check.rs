@@ -53,8 +53,7 @@ pub(super) fn check(reader: &Reader<'_>, handed: &[Handed]) -> Result<Vec<String
         doubtful.extend(taken.warnings.into_iter().map(|w| format!("{name}: {w}")));
         let (mut wrong, mut odd) = (Vec::new(), Vec::new());
         for finding in taken.replicates.first().map(|i| intake::diagnose(i, &reference, size)).unwrap_or_default() {
-            let is_doubt = matches!(finding, intake::Finding::Curve { .. } | intake::Finding::Shifted { .. });
-            if is_doubt { odd.push(finding.to_string()) } else { wrong.push(finding.to_string()) }
+            if finding.is_doubt() { odd.push(finding.to_string()) } else { wrong.push(finding.to_string()) }
         }
         if !wrong.is_empty() {
             return Err(ScoreError::SelfCheck(format!("{name}: {}", wrong.join("; and: "))));

@@ -10,7 +10,7 @@ pub use estimator::EstimatorFile;
 pub use file::{JudgeSettings, Rays, Replicates, SoftwareAdapter, SuiteFile};
 pub use gate::{GateFile, LimitFile};
 pub use plan::{Case, Plan, Platform};
-pub use renderer::{EnvironmentFile, OwnRenderer, RendererFile};
+pub use renderer::{EnvironmentFile, OwnRenderer, RendererFile, is_taken};
 
 use crate::{
     gate::Gate,

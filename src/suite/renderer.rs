@@ -17,6 +17,11 @@ use std::{
 /// Names that mean something else on the command line.
 const TAKEN: [&str; 3] = ["cpu", "gpu", "auto"];
 
+/// Whether no renderer of somebody else's may have a name, in whatever case.
+pub fn is_taken(name: &str) -> bool {
+    TAKEN.iter().any(|taken| taken.eq_ignore_ascii_case(name))
+}
+
 /// Arguments of a command, at most.
 const MOST: usize = 256;
 
@@ -147,7 +152,7 @@ pub(super) fn build(suite: &SuiteFile, methods: &[Method], folder: &Path) -> Res
     for file in files {
         check_name(&file.name).map_err(|e| format!("renderer: {e}"))?;
         let is = |name: &str| name.eq_ignore_ascii_case(&file.name);
-        if TAKEN.into_iter().any(is) {
+        if is_taken(&file.name) {
             return Err(format!("renderer: '{}' is the name of our own: choose another", file.name));
         }
         if built.iter().any(|b| is(&b.file.name)) {

@@ -14,7 +14,7 @@ use crate::{
     run::{Means, Prepared, Stop},
     suite::{Plan, Platform, Suite},
 };
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Pack scenes for another renderer: glb with and without the occluder, views, G-buffer,
 /// and a page that says what to render. Of a suite also judge, converged images and region maps, so that
@@ -77,10 +77,6 @@ fn of_suite(args: &Args, suite: &str) -> Result<Exit, Failure> {
     kit::write_suite(&prepared, &suite, &means, &args.out, &bar())?;
     let readme = args.out.join("README.md");
     let scenes = suite.scenes.len();
-    tell(&format!("{}: {scenes} scenes of suite '{}' are packed; begin here", shown(&readme), suite.name));
+    tell(&format!("{}: {scenes} scenes of suite '{}' are packed; begin here", readme.display(), suite.name));
     Ok(Exit::Pass)
-}
-
-fn shown(path: &Path) -> String {
-    path.display().to_string()
 }

@@ -184,6 +184,11 @@ impl Finding {
         }
     }
 
+    /// Whether the image may be measured all the same, since it may be meant to be so.
+    pub fn is_doubt(&self) -> bool {
+        matches!(self, Finding::Curve { .. } | Finding::Shifted { .. })
+    }
+
     /// What to do about it.
     pub fn remedy(&self) -> String {
         match self {
