@@ -27,7 +27,7 @@ const _: () = assert!(Exit::Usage as u8 == 2);
 fn quiet_mesa() {
     if std::env::var_os("NODEVICE_SELECT").is_none() {
         // SAFETY: the first thing main does, so no other thread can be reading or
-        // writing the environment. Tested by `tests/cli.rs`, which runs the
+        // writing the environment. Tested by `tests/commands/cli.rs`, which runs the
         // program and finds standard error free of it.
         unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
     }

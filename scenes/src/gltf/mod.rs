@@ -15,7 +15,7 @@
 //! occlusion maps, animation, skins and morph targets are left out.
 
 // Why the container and the JSON are read here and not by the crate `gltf`
-// (1.4.1, with gltf-json 1.4.1). What was tried is in tests/gltf_oracle.rs, which
+// (1.4.1, with gltf-json 1.4.1). What was tried is in tests/gltf/oracle.rs, which
 // also holds what we write against that crate:
 // - `json::Index`, component types, modes and wrap modes are cut to 32 bits
 //   (`value as u32`): mesh 4294967296 is read as mesh 0, component type

@@ -128,7 +128,7 @@ impl Device {
             // asks for: structures are built from buffers that hold all their
             // vertices before any query, bind groups keep them, a query is
             // initialised before it goes on and not asked again once it ended.
-            // Tested by tests/gpu_query.rs.
+            // Tested by tests/renderers/gpu_query.rs.
             experimental_features = unsafe { wgpu::ExperimentalFeatures::enabled() };
         }
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
@@ -176,8 +176,8 @@ impl Device {
             // before they are used: taps of screen space, of history and of the filter.
             // A stack has an entry for each level of the tree, in the column of its own
             // invocation. Loops end with the rays, the lights, the taps or the tree.
-            // Tested by `checks_change_nothing` in tests/gpu.rs, by
-            // `no_kernel_has_validation_errors` in tests.rs and by tests/smoothing.rs,
+            // Tested by `checks_change_nothing` in tests/renderers/gpu.rs, by
+            // `no_kernel_has_validation_errors` in tests.rs and by tests/renderers/smoothing.rs,
             // which run all kernels but ray query's with every check on.
             Checks::Off => unsafe {
                 self.device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked())
