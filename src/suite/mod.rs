@@ -20,11 +20,12 @@ use crate::{
 use std::path::Path;
 
 /// The built-in suites, by name.
-pub const BUILT_IN: [(&str, &str); 4] = [
+pub const BUILT_IN: [(&str, &str); 5] = [
     ("smoke", include_str!("smoke.toml")),
     ("thin-occluders", include_str!("thin-occluders.toml")),
     ("library", include_str!("library.toml")),
     ("full", include_str!("full.toml")),
+    ("paper", include_str!("paper.toml")),
 ];
 
 /// A method under a name.
@@ -322,6 +323,7 @@ mod tests {
             suite.scenes.into_iter().map(|s| s.name).collect()
         };
         assert_eq!(scenes("smoke").len(), 3);
+        assert!(scenes("paper").contains(&"curtain-arcade".to_owned()));
         // Between them every scene of the library, once; and in all.
         let mut parts = [scenes("thin-occluders"), scenes("library")].concat();
         let mut full = scenes("full");
