@@ -445,3 +445,32 @@ fn own_gates_and_own_estimators() {
     assert!(!record.suite.methods.contains_key("my-ao"));
     fs::remove_file(gates).unwrap();
 }
+
+/// What is declared and no image is of is a slip, wherever it is declared.
+#[test]
+fn a_slip_in_what_is_declared_is_an_error() {
+    let images = Images::new();
+    images.all(|_, image, _| image.to_vec());
+    for (options, says) in [
+        (
+            ["--estimator", "clasic"],
+            "estimator is 'clasic', but no image is of it: the files' names say classic (8 images), extended (8 images)",
+        ),
+        (["--rays", "16"], "rays is 16, but no image is of it: the files' names say 4 (16 images)"),
+    ] {
+        let (code, text) = images.score(&options);
+        assert!(code == 2 && text.contains(says), "{code}: {text}");
+        assert!(!images.out().exists());
+    }
+    assert_eq!(images.score(&["--estimator", "classic", "--rays", "4"]).0, 0);
+    fs::write(images.folder.path().join("score.toml"), "estimator = 'clasic'").unwrap();
+    let (code, text) = images.score(&[]);
+    assert!(code == 2 && text.contains("'clasic'"), "{code}: {text}");
+    // The self-check needs neither.
+    fs::remove_file(images.folder.path().join("score.toml")).unwrap();
+    images.self_check(|image, _| image.to_vec());
+    let at = |name: &str| images.folder.path().join(name);
+    fs::rename(at("self-check.classic.16.exr"), at("self-check.exr")).unwrap();
+    let (code, text) = images.score(&[]);
+    assert!(code == 0 && !text.contains("self-check"), "{code}: {text}");
+}

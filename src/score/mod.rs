@@ -10,14 +10,17 @@ pub use declaration::{CurveChoice, Declaration, FILE, Fit, KnownCurve};
 
 use crate::{
     disk::DiskError,
-    intake::{self, Defaults, IntakeError},
+    intake::{self, Defaults, Handed, IntakeError},
     record::{HandedIn, UndoneCurve},
     run::{CaseImages, References, ReferencesError},
     suite::{Case, is_taken},
 };
 use reading::Reader;
 use self_check::SCENE as SELF_CHECK;
-use std::{collections::BTreeSet, path::Path};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
 /// Why images cannot be scored.
 #[derive(Debug, thiserror::Error)]
@@ -74,7 +77,8 @@ pub fn gather(
     let mut scenes: Vec<&str> = file.scenes.iter().map(|s| s.facts.name.as_str()).collect();
     scenes.push(SELF_CHECK);
     let estimators: Vec<&str> = references.suite().methods.iter().map(|m| m.name.as_str()).collect();
-    let defaults = Defaults { estimator: declaration.estimator.clone(), rays: declaration.rays };
+    let free = Some(SELF_CHECK.to_owned());
+    let defaults = Defaults { estimator: declaration.estimator.clone(), rays: declaration.rays, free };
     let found = intake::files(folder, &scenes, &estimators, &defaults)?;
     let mut warnings = found.warnings;
     let renderer = declaration.renderer.clone().unwrap_or_else(|| name_of(folder));
@@ -89,6 +93,12 @@ pub fn gather(
              scenes {scenes}",
             folder.display()
         )));
+    }
+    check_used(declaration, &handed).map_err(ScoreError::Declared)?;
+    if let Some(own) = declaration.estimator.as_deref().filter(|own| !estimators.contains(own)) {
+        let known = estimators.join(", ");
+        warnings
+            .push(format!("The estimator '{own}' is none of the kit's ({known}): of it there is no converged image."));
     }
     // A slip in a name must not leave out what was to be judged.
     if found.not_taken > 0 && !is_partial {
@@ -108,6 +118,30 @@ pub fn gather(
     }
     let kit = format!("aogauge {}, suite {}, seed {}", file.tool, file.suite, file.seed);
     Ok(Gathered { cases, handed_in: HandedIn { renderer, kit, curve, warnings } })
+}
+
+/// Refuses an estimator or a number of rays that is declared and that no image is of: the
+/// names of files win, and what was declared may be a slip.
+fn check_used(declaration: &Declaration, handed: &[Handed]) -> Result<(), String> {
+    let counted = |of: &dyn Fn(&Handed) -> String| {
+        let mut found: BTreeMap<String, usize> = BTreeMap::new();
+        for h in handed {
+            *found.entry(of(h)).or_default() += h.images.len();
+        }
+        found.into_iter().map(|(what, n)| format!("{what} ({n} images)")).collect::<Vec<_>>().join(", ")
+    };
+    let unused = |field: &str, value: &str, found: String| {
+        Err(format!(
+            "{field} is {value}, but no image is of it: the files' names say {found}, and they win; correct it or leave it out"
+        ))
+    };
+    if let Some(own) = declaration.estimator.as_ref().filter(|own| !handed.iter().any(|h| h.estimator == **own)) {
+        return unused("estimator", &format!("'{own}'"), counted(&|h| h.estimator.clone()));
+    }
+    if let Some(own) = declaration.rays.filter(|own| !handed.iter().any(|h| h.rays == *own)) {
+        return unused("rays", &own.to_string(), counted(&|h| h.rays.to_string()));
+    }
+    Ok(())
 }
 
 /// A legal name from that of a folder.
