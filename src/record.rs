@@ -520,8 +520,12 @@ impl Record {
 
     /// Whether the suite has gates and not one of them was held against anything, each
     /// with an excuse: what such a run shows is not that all is well. That there is no base record, on
-    /// purpose, is excuse enough where all gates need one.
+    /// purpose, is excuse enough where all gates need one. Of images that were handed in: whether the suite has
+    /// gates and none of them was held against an image; that the kit's own judge passes is nothing to them.
     pub fn has_judged_nothing(&self) -> bool {
+        if self.handed_in.is_some() {
+            return !self.suite.gates.is_empty() && self.verdicts.iter().all(|v| v.case.is_none());
+        }
         let needs_base = |name: &str| self.suite.gates.iter().any(|g| g.name == name && g.is_against_base());
         let is_first = self.no_base && self.idle_gates.iter().all(|g| needs_base(&g.gate));
         let all_excused = !self.idle_gates.is_empty() && self.idle_gates.iter().all(|g| g.excused);

@@ -387,7 +387,17 @@ fn whole_frames_give_what_they_can() {
     for (r, image) in replicates.iter().enumerate() {
         lone.exr(&format!("curtain-arcade.classic.4.{r:04}.frame.exr"), image, size);
     }
-    lone.score(&["--partial"]);
+    // The gates of the suite are on dK, and a gate on the judge is none on the renderer.
+    let (code, text) = lone.score(&["--partial"]);
+    assert!(code == 4 && text.contains("nothing of the renderer was judged"), "{code}: {text}");
+    let gates = lone.out().with_extension("toml");
+    let of = |metric: &str| format!("[[gate]]\nname = '{metric}'\nmetric = '{metric}'\nmin = -50.0\n");
+    for (text, expected) in [(of("judge-contrast"), 4), (of("judge-contrast") + &of("contrast"), 0)] {
+        fs::write(&gates, text).unwrap();
+        let (code, text) = lone.score(&["--partial", "--gates", gates.to_str().unwrap()]);
+        assert_eq!(code, expected, "{text}");
+    }
+    fs::remove_file(&gates).unwrap();
     let record = lone.record();
     let own = case(&record, "curtain-arcade", "classic");
     assert_eq!(own.source.as_ref().unwrap().shows, Shows::Frame);

@@ -299,6 +299,9 @@ pub(super) fn finish(record: &Record, folder: &RecordFolder, beside: &Beside, fo
     let end = match exit {
         Exit::Pass if record.verdicts.is_empty() && record.idle_gates.is_empty() => &bare,
         Exit::Pass if record.verdicts.is_empty() => "rendered; the gates wait for a base record (--no-base)",
+        Exit::Nothing if record.handed_in.is_some() => {
+            "nothing of the renderer was judged: no gate speaks of what was handed in; --gates FILE names gates of your own"
+        }
         Exit::Nothing => "nothing was judged: the suite has gates, and none of them was held against anything",
         Exit::Pass => "pass",
         _ => "not a pass",
