@@ -15,7 +15,7 @@ mod version;
 pub use end::End;
 pub use folder::RecordFolder;
 pub(crate) use folder::{aside, is_aside};
-pub use source::{HandedIn, Intervals, Shows, Source, UndoneCurve};
+pub use source::{HandedIn, Intervals, Shows, Source, UndoneCurve, told_once};
 pub use until_sure::{Budget, Undecided, UntilSure};
 
 use crate::{
@@ -399,6 +399,9 @@ pub struct CaseRecord {
     /// own renderers, and where the run did not come to it.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub log: Option<String>,
+    /// What is doubtful in images of an external renderer, held against the converged image.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub warnings: Vec<String>,
     /// Its metrics by occluder, where the scene shows two or more.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub occluders: Vec<OccluderMetrics>,
@@ -417,6 +420,7 @@ impl CaseRecord {
             replicates: None,
             source: None,
             log: None,
+            warnings: vec![],
             occluders: vec![],
         }
     }
@@ -505,6 +509,15 @@ impl Record {
             }
         }
         Ok(())
+    }
+
+    /// What is doubtful in the images of cases that were not rendered here, the same of several once.
+    pub fn doubts(&self) -> Vec<String> {
+        let of = |c: &CaseRecord| {
+            let handed_in = c.source.iter().flat_map(|s| &s.warnings);
+            handed_in.chain(&c.warnings).map(|w| (c.case.id(), w.clone())).collect::<Vec<_>>()
+        };
+        told_once(&self.cases.iter().flat_map(of).collect::<Vec<_>>(), "cases", self.cases.len())
     }
 
     /// Milliseconds that one replicate of a case took; None where that is not known.

@@ -292,6 +292,9 @@ pub(super) fn tell_moved(folder: &RecordFolder) {
 
 /// Makes the reports, and says how it went.
 pub(super) fn finish(record: &Record, folder: &RecordFolder, beside: &Beside, format: Format) -> Result<Exit, Failure> {
+    for doubt in record.doubts() {
+        tell(&format!("aogauge: {doubt}"));
+    }
     let files = beside.make(record, folder.path(), format)?;
     let exit = Exit::of(record);
     let done = if record.handed_in.is_some() { "scored" } else { "rendered" };
