@@ -307,7 +307,7 @@ fn other_scales_and_values_below_zero_are_told() {
         }
     }
     let text = SELF.diagnose(&SELF.classic(64).iter().map(|v| v * 255.0).collect::<Vec<_>>())[0].to_string();
-    assert!(text.starts_with("out of range: values run from 0.000 to 255.000"), "{text}");
+    assert!(text.starts_with("out of range: values run from 3.98"), "{text}");
     assert!(text.ends_with("divide by 255"), "{text}");
     // Light is no openness of another scale.
     let light: Vec<f32> = SELF.classic(64).iter().enumerate().map(|(i, v)| v * (1 + i % 7) as f32).collect();
@@ -328,8 +328,10 @@ fn strength_is_told_from_codes() {
                 let near = |s: &f64| (s / f64::from(strength) - 1.0).abs() < 0.03;
                 let is = |f: &Finding| match f {
                     Finding::Strength { strength } => near(strength),
-                    // In the corner openness is 0.5 to 1, where the two are nearly the same.
-                    Finding::Encoded { strength: Some(s), .. } => bench.scene.name == "corner" && near(s),
+                    // In the corner openness is 0.5 to 1, where the two are nearly the same, as they are in noise.
+                    Finding::Encoded { strength: Some(s), .. } => {
+                        (bench.scene.name == "corner" || rays == 4) && near(s)
+                    }
                     _ => false,
                 };
                 // Above 1 it leaves values below 0, too.
