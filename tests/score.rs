@@ -478,9 +478,9 @@ fn a_slip_in_what_is_declared_is_an_error() {
     for (options, says) in [
         (
             ["--estimator", "clasic"],
-            "estimator is 'clasic', but no image is of it: the files' names say classic (8 images), extended (8 images)",
+            "estimator is 'clasic', but no image is of it: the files' names say classic (8 files), extended (8 files)",
         ),
-        (["--rays", "16"], "rays is 16, but no image is of it: the files' names say 4 (16 images)"),
+        (["--rays", "16"], "rays is 16, but no image is of it: the files' names say 4 (16 files)"),
     ] {
         let (code, text) = images.score(&options);
         assert!(code == 2 && text.contains(says), "{code}: {text}");

@@ -150,8 +150,5 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     let folder = RecordFolder::create(&args.out)?;
     tell_moved(&folder);
     let record = scored.score(gathered.handed_in, &folder)?;
-    for (id, why) in record.cases.iter().filter_map(|c| Some((c.case.id(), c.error.as_ref()?))) {
-        tell(&format!("aogauge: {id}: {why}"));
-    }
     finish(&record, &folder, &args.beside, args.format)
 }

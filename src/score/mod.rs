@@ -147,7 +147,7 @@ fn check_used(declaration: &Declaration, handed: &[Handed]) -> Result<(), String
         for h in handed {
             *found.entry(of(h)).or_default() += h.images.len();
         }
-        found.into_iter().map(|(what, n)| format!("{what} ({n} images)")).collect::<Vec<_>>().join(", ")
+        found.into_iter().map(|(what, n)| format!("{what} ({n} files)")).collect::<Vec<_>>().join(", ")
     };
     let unused = |field: &str, value: &str, found: String| {
         Err(format!(
