@@ -22,6 +22,7 @@ pub mod render;
 pub mod report;
 pub mod review;
 pub mod run;
+mod scene_files;
 pub mod score;
 pub mod screen_camera;
 pub mod stats;

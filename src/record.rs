@@ -15,7 +15,7 @@ mod version;
 pub use end::End;
 pub use folder::RecordFolder;
 pub(crate) use folder::{aside, is_aside};
-pub use source::{HandedIn, Intervals, Shows, Source, UndoneCurve};
+pub use source::{HandedIn, Intervals, Shows, Source, UndoneCurve, told_once};
 pub use until_sure::{Budget, Undecided, UntilSure};
 
 use crate::{
@@ -399,6 +399,9 @@ pub struct CaseRecord {
     /// own renderers, and where the run did not come to it.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub log: Option<String>,
+    /// What is doubtful in images of an external renderer, held against the converged image.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub warnings: Vec<String>,
     /// Its metrics by occluder, where the scene shows two or more.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub occluders: Vec<OccluderMetrics>,
@@ -417,6 +420,7 @@ impl CaseRecord {
             replicates: None,
             source: None,
             log: None,
+            warnings: vec![],
             occluders: vec![],
         }
     }
@@ -507,6 +511,15 @@ impl Record {
         Ok(())
     }
 
+    /// What is doubtful in the images of cases that were not rendered here, the same of several once.
+    pub fn doubts(&self) -> Vec<String> {
+        let of = |c: &CaseRecord| {
+            let handed_in = c.source.iter().flat_map(|s| &s.warnings);
+            handed_in.chain(&c.warnings).map(|w| (c.case.id(), w.clone())).collect::<Vec<_>>()
+        };
+        told_once(&self.cases.iter().flat_map(of).collect::<Vec<_>>(), "cases", self.cases.len())
+    }
+
     /// Milliseconds that one replicate of a case took; None where that is not known.
     pub fn milliseconds(&self, case: &CaseRecord) -> Option<f64> {
         let seconds = self.timing.cases.get(&case.case.id())?;
@@ -520,8 +533,12 @@ impl Record {
 
     /// Whether the suite has gates and not one of them was held against anything, each
     /// with an excuse: what such a run shows is not that all is well. That there is no base record, on
-    /// purpose, is excuse enough where all gates need one.
+    /// purpose, is excuse enough where all gates need one. Of images that were handed in: whether the suite has
+    /// gates and none of them was held against an image; that the kit's own judge passes is nothing to them.
     pub fn has_judged_nothing(&self) -> bool {
+        if self.handed_in.is_some() {
+            return !self.suite.gates.is_empty() && self.verdicts.iter().all(|v| v.case.is_none());
+        }
         let needs_base = |name: &str| self.suite.gates.iter().any(|g| g.name == name && g.is_against_base());
         let is_first = self.no_base && self.idle_gates.iter().all(|g| needs_base(&g.gate));
         let all_excused = !self.idle_gates.is_empty() && self.idle_gates.iter().all(|g| g.excused);

@@ -290,8 +290,30 @@ pub(super) fn tell_moved(folder: &RecordFolder) {
     }
 }
 
+/// Cases that ended with an error, and are told one by one.
+const MOST_ENDED: usize = 12;
+
+/// Says which cases ended with an error. Where the run ended early, that says why.
+fn tell_ended(record: &Record) {
+    let ended: Vec<String> =
+        record.cases.iter().filter_map(|c| Some(format!("{}: {}", c.case.id(), c.error.as_ref()?))).collect();
+    if record.incomplete.is_some() {
+        return;
+    }
+    for why in ended.iter().take(MOST_ENDED) {
+        tell(&format!("aogauge: {why}"));
+    }
+    if ended.len() > MOST_ENDED {
+        tell(&format!("aogauge: {} more cases ended with an error: they are in the report", ended.len() - MOST_ENDED));
+    }
+}
+
 /// Makes the reports, and says how it went.
 pub(super) fn finish(record: &Record, folder: &RecordFolder, beside: &Beside, format: Format) -> Result<Exit, Failure> {
+    for doubt in record.doubts() {
+        tell(&format!("aogauge: {doubt}"));
+    }
+    tell_ended(record);
     let files = beside.make(record, folder.path(), format)?;
     let exit = Exit::of(record);
     let done = if record.handed_in.is_some() { "scored" } else { "rendered" };
@@ -299,6 +321,9 @@ pub(super) fn finish(record: &Record, folder: &RecordFolder, beside: &Beside, fo
     let end = match exit {
         Exit::Pass if record.verdicts.is_empty() && record.idle_gates.is_empty() => &bare,
         Exit::Pass if record.verdicts.is_empty() => "rendered; the gates wait for a base record (--no-base)",
+        Exit::Nothing if record.handed_in.is_some() => {
+            "nothing of the renderer was judged: no gate speaks of what was handed in; --gates FILE names gates of your own"
+        }
         Exit::Nothing => "nothing was judged: the suite has gates, and none of them was held against anything",
         Exit::Pass => "pass",
         _ => "not a pass",

@@ -28,8 +28,8 @@ aogauge score mine/ --kit kit/ --means occlusion --rows bottom --curve fit --rep
 aogauge score mine/ --kit kit/ --gates my-gates.toml --format json\n\n\
 Images are called SCENE.ESTIMATOR.RAYS.REPLICATE.exr. What options declare may stand in score.toml beside\nthem. \
 docs/your-renderer.md takes you through it.\n\n\
-Exit codes: 0 pass, 1 a gate failed, 2 wrong usage or a wrong self-check image, 4 there is nothing to score,\n\
-5 images are missing or wrong, 6 not decided.")]
+Exit codes: 0 pass, 1 a gate failed, 2 wrong usage, a damaged kit or a wrong self-check image, 4 there is\n\
+nothing to score or no gate speaks of it, 5 images are missing or wrong, 6 not decided.")]
 pub struct Args {
     /// The folder of the images.
     images: PathBuf,
@@ -88,7 +88,7 @@ struct Declared {
     layer: Option<String>,
     /// Undo an intensity curve, seen = GAIN * openness ^ EXPONENT: two numbers with a comma,
     /// or fit, which finds them on the control scenes.
-    #[arg(long, value_name = "fit|GAIN,EXPONENT", value_parser = curve)]
+    #[arg(long, value_name = "fit|GAIN,EXPONENT", value_parser = curve, allow_hyphen_values = true)]
     curve: Option<CurveChoice>,
 }
 
@@ -103,7 +103,7 @@ fn curve(text: &str) -> Result<CurveChoice, String> {
         return Ok(CurveChoice::Fit(Fit::Fit));
     }
     let parsed = text.split_once(',').and_then(|(g, e)| Some((g.trim().parse().ok()?, e.trim().parse().ok()?)));
-    let (gain, exponent) = parsed.ok_or("give fit, or gain and exponent as in 1,2.2")?;
+    let (gain, exponent) = parsed.ok_or("give fit, or gain (0.000001 to 1000) and exponent (0.1 to 10) as in 1,2.2")?;
     Ok(CurveChoice::Known(KnownCurve { gain, exponent }))
 }
 
@@ -145,19 +145,10 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     for warning in &gathered.handed_in.warnings {
         tell(&format!("aogauge: {warning}"));
     }
-    let cases = gathered.cases.iter().filter_map(|c| Some((c.case.id(), c.source.as_ref()?)));
-    for (id, source) in cases {
-        for warning in &source.warnings {
-            tell(&format!("aogauge: {id}: {warning}"));
-        }
-    }
     let scored =
         references.ready(&gathered.cases, gates.as_ref().map(|(label, text)| (label.as_str(), text.as_str())))?;
     let folder = RecordFolder::create(&args.out)?;
     tell_moved(&folder);
     let record = scored.score(gathered.handed_in, &folder)?;
-    for (id, why) in record.cases.iter().filter_map(|c| Some((c.case.id(), c.error.as_ref()?))) {
-        tell(&format!("aogauge: {id}: {why}"));
-    }
     finish(&record, &folder, &args.beside, args.format)
 }

@@ -93,6 +93,18 @@ impl Gate {
         self.metric == MetricName::JudgeContrast && (self.scenes.is_empty() || self.scenes.iter().any(|s| s == scene))
     }
 
+    /// Whether its metric is taken under an occluder, so that it says nothing of scenes without.
+    pub fn needs_occluder(&self) -> bool {
+        use MetricName::{Bias, Contrast, ContrastError, JudgeContrast, Mae, Michelson, Openness, Removed, Rmse};
+        match self.metric {
+            Contrast | Michelson | ContrastError | Removed | JudgeContrast => true,
+            Openness | Bias | Mae | Rmse => {
+                matches!(self.region, Some(Region::Footprint | Region::Left | Region::Right))
+            }
+            _ => false,
+        }
+    }
+
     /// Whether it needs the record of another run.
     pub fn is_against_base(&self) -> bool {
         self.against.as_deref() == Some(BASE)

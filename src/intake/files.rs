@@ -25,6 +25,8 @@ pub struct Defaults {
     pub estimator: Option<String>,
     /// Their rays a pixel.
     pub rays: Option<u32>,
+    /// A scene whose images need neither.
+    pub free: Option<String>,
 }
 
 /// What was handed in.
@@ -142,7 +144,7 @@ struct Intake<'a> {
 
 impl<'a> Intake<'a> {
     fn new(folder: &'a Path) -> Self {
-        const NOTHING: &Defaults = &Defaults { estimator: None, rays: None };
+        const NOTHING: &Defaults = &Defaults { estimator: None, rays: None, free: None };
         Intake {
             folder,
             scenes: &[],
@@ -175,9 +177,11 @@ impl<'a> Intake<'a> {
     }
 
     fn key(&self, name: Name) -> Result<(CaseKey, (Option<u32>, Shown)), String> {
+        let is_free = self.defaults.free.as_ref() == Some(&name.scene);
         let estimator = name.estimator.or_else(|| self.defaults.estimator.clone());
+        let estimator = estimator.or_else(|| is_free.then(|| "any".to_owned()));
         let estimator = estimator.ok_or("names no estimator, and none is declared: `estimator`")?;
-        let rays = name.rays.or(self.defaults.rays).filter(|r| *r > 0);
+        let rays = name.rays.or(self.defaults.rays).or(is_free.then_some(1)).filter(|r| *r > 0);
         let rays = rays.ok_or("names no number of rays, and none is declared: `rays`")?;
         Ok(((name.scene, estimator, rays), (name.replicate, name.shown)))
     }
@@ -316,11 +320,14 @@ mod tests {
 
     #[test]
     fn what_names_leave_out_is_declared() {
-        let defaults = Defaults { estimator: Some("my.ao".into()), rays: Some(4) };
+        let defaults = Defaults { estimator: Some("my.ao".into()), rays: Some(4), free: None };
         let names = ["curtain.exr", "curtain.open.my.ao.8.exr", "curtain.open.extended.exr"];
         let files = found(&names, &defaults).unwrap();
         let cases: Vec<(&str, u32)> = files.cases.iter().map(|c| (c.estimator.as_str(), c.rays)).collect();
         assert_eq!((cases, files.warnings.len()), (vec![("my.ao", 4), ("extended", 4), ("my.ao", 8)], 0));
+        let free = Defaults { free: Some("curtain".into()), ..Defaults::default() };
+        assert_eq!(found(&["curtain.exr"], &free).unwrap().cases[0].rays, 1);
+        assert_eq!(found(&["curtain.open.exr"], &free).unwrap().not_taken, 1);
         let warnings = plain(&["curtain.exr", "curtain.classic.exr"]).unwrap().warnings;
         assert!(warnings.iter().any(|w| w.contains("`estimator`") && w.contains("'curtain.exr'")), "{warnings:?}");
         assert!(warnings.iter().any(|w| w.contains("`rays`") && w.contains("'curtain.classic.exr'")), "{warnings:?}");

@@ -15,11 +15,11 @@ mod upsample;
 pub use curve::{Curve, fit_curve};
 pub use declared::{Declared, Means, Rows, Share, Upsample};
 pub use detect::read_against;
-pub use diagnose::{FACTORS, Finding, Reference, Scaled, Turn, alike, diagnose};
+pub use diagnose::{FACTORS, Finding, Reference, Scaled, Turn, alike, diagnose, frame_turn, is_rather};
 pub use files::{Defaults, Files, Handed, HandedImage, files};
 pub use name::Shown;
 pub use ratio::{Frame, LONE_FRAME, Ratio, frame, ratio};
-pub use read::{Taken, read};
+pub use read::{Taken, check_numbers, read};
 
 /// A scene of no suite, by whose picture a renderer shows that it holds its images the right
 /// way, saves them linear, and takes R in metres: a scene file. It has no occluder, is like none of its
@@ -75,6 +75,21 @@ pub enum IntakeError {
         folder: PathBuf,
         /// What is wrong, with the names of the files.
         what: String,
+    },
+    /// The frame with AO is the one without.
+    #[error(
+        "{with} and {without} are exchanged: {brighter} of {known} pixels are brighter in the frame with AO, which only takes \
+         light away; exchange `.with` and `.without` in their names"
+    )]
+    Exchanged {
+        /// The frame that is called to be with AO.
+        with: PathBuf,
+        /// The other.
+        without: PathBuf,
+        /// Pixels that are brighter with AO.
+        brighter: usize,
+        /// Pixels that are known.
+        known: usize,
     },
     /// Two whole frames cannot be divided.
     #[error("the frames with and without AO cannot be divided: {0}")]

@@ -51,6 +51,37 @@ pub struct Ratio {
     pub rounding: f32,
     /// Pixels that are known and brighter with AO than without, by more than rounding and 0.001.
     pub brighter: usize,
+    /// Those that are darker, likewise.
+    pub darker: usize,
+}
+
+/// From this share of the known pixels on, and so many times as many as are darker, pixels that are
+/// brighter with AO than without mean that the frames are exchanged. Noise leaves as many darker ones.
+const EXCHANGED: f64 = 0.05;
+const EXCHANGED_TIMES: usize = 10;
+
+impl Ratio {
+    /// Refuses frames that are exchanged.
+    ///
+    /// # Errors
+    /// [`IntakeError::Exchanged`].
+    pub fn check_order(&self, with: &Path, without: &Path) -> Result<(), IntakeError> {
+        let Ratio { brighter, darker, .. } = *self;
+        let known = self.openness.iter().filter(|v| v.is_finite()).count();
+        if (brighter as f64) < EXCHANGED * known as f64 || brighter < EXCHANGED_TIMES * darker {
+            return Ok(());
+        }
+        Err(IntakeError::Exchanged { with: with.to_owned(), without: without.to_owned(), brighter, known })
+    }
+
+    /// What whoever made the frames should know, one sentence each.
+    pub fn remarks(&self) -> Vec<String> {
+        let masked = (self.masked > 0)
+            .then(|| format!("{} pixels are too dark, too roughly rounded or cut off at white: left out", self.masked));
+        let brighter =
+            (self.brighter > 0).then(|| format!("{} pixels are brighter with AO than without it", self.brighter));
+        masked.into_iter().chain(brighter).collect()
+    }
 }
 
 /// Reads a whole frame as linear light at the size of a view.
@@ -143,7 +174,7 @@ pub fn ratio(with: &Frame, without: &Frame) -> Result<Ratio, IntakeError> {
         let why = format!("they have {pixels} and {} pixels", without.light.len());
         return Err(IntakeError::Ratio(why));
     }
-    let mut found = Ratio { openness: Vec::with_capacity(pixels), masked: 0, rounding: 0.0, brighter: 0 };
+    let mut found = Ratio { openness: Vec::with_capacity(pixels), masked: 0, rounding: 0.0, brighter: 0, darker: 0 };
     for i in 0..pixels {
         let (a, b) = (with.light[i], without.light[i]);
         let value = a / b;
@@ -156,6 +187,7 @@ pub fn ratio(with: &Frame, without: &Frame) -> Result<Ratio, IntakeError> {
         if known {
             found.rounding = found.rounding.max(rounding);
             found.brighter += usize::from(value > 1.0 + rounding + 1e-3);
+            found.darker += usize::from(value < 1.0 - rounding - 1e-3);
         }
     }
     if found.openness.iter().all(|v| v.is_nan()) {
@@ -195,6 +227,11 @@ mod tests {
         let path = folder.path().join("a.exr");
         let found = ratio(&floats(&path, true), &floats(&path, false)).unwrap();
         assert!((0..256).all(|i| (found.openness[i] - truth(i)).abs() < 1e-6));
+        let of = |name: &str| folder.path().join(name);
+        assert!(found.check_order(&of("a.with.exr"), &of("a.without.exr")).is_ok());
+        let exchanged = ratio(&floats(&path, false), &floats(&path, true)).unwrap();
+        let message = exchanged.check_order(&of("a.with.exr"), &of("a.without.exr")).unwrap_err().to_string();
+        assert!(message.contains("a.with.exr and ") && message.contains("are exchanged: 248 of 256"), "{message}");
         assert_eq!((found.masked, found.rounding, found.brighter), (0, 0.0, 0));
     }
 

@@ -37,7 +37,7 @@ pub struct Taken {
 /// OpenEXR, PNG of 8 and 16 bits, and whatever else [`crate::picture::read`] reads. The
 /// stored numbers become linear (by `encoding`), then openness (by `means`), then rows are
 /// turned and the image is brought to the view's size. Pixels that hold no finite number
-/// become NaN; [`Taken::check`] tells whether they matter. Nothing is clamped.
+/// stay so; [`super::diagnose`] tells whether they matter. Nothing is clamped.
 ///
 /// # Errors
 /// [`IntakeError::Disk`] where the file cannot be read or has no such layer,
@@ -80,19 +80,17 @@ pub fn read(path: &Path, declared: &Declared, view: [u32; 2]) -> Result<Taken, I
     Ok(Taken { replicates, encoding, undeclared, warnings })
 }
 
-impl Taken {
-    /// Whether every pixel that sees a surface holds a number, in each replicate; `seen` tells
-    /// of each pixel of the view whether it does. Errors name `path`.
-    ///
-    /// # Errors
-    /// [`IntakeError::Holes`] with their number over all replicates and the first of them.
-    pub fn check(&self, path: &Path, seen: &[bool], width: usize) -> Result<(), IntakeError> {
-        let is_hole = |&(i, v): &(usize, &f32)| seen.get(i) == Some(&true) && !v.is_finite();
-        let mut holes = self.replicates.iter().flat_map(|image| image.iter().enumerate().filter(is_hole));
-        let Some((first, _)) = holes.next() else { return Ok(()) };
-        let (count, width) = (1 + holes.count(), width.max(1));
-        Err(IntakeError::Holes { path: path.to_owned(), count, first: [first % width, first / width] })
-    }
+/// Whether every pixel that sees a surface holds a number; where a surface is seen, `seen` holds
+/// one, and where that is empty, everywhere. Errors name `path`.
+///
+/// # Errors
+/// [`IntakeError::Holes`] with their number and the first of them.
+pub fn check_numbers(path: &Path, image: &[f32], seen: &[f32], width: usize) -> Result<(), IntakeError> {
+    let is_hole = |&(i, v): &(usize, &f32)| !v.is_finite() && seen.get(i).is_none_or(|s| s.is_finite());
+    let mut holes = image.iter().enumerate().filter(is_hole);
+    let Some((first, _)) = holes.next() else { return Ok(()) };
+    let (count, width) = (1 + holes.count(), width.max(1));
+    Err(IntakeError::Holes { path: path.to_owned(), count, first: [first % width, first / width] })
 }
 
 /// The replicates of an OpenEXR file, or its one image.
@@ -171,8 +169,7 @@ fn openness(
     let mut values = grey(path, found, warnings)?;
     for v in &mut values {
         let light = if encoding == Encoding::Srgb { linear(*v) } else { *v };
-        let openness = if declared.means == Means::Occlusion { 1.0 - light } else { light };
-        *v = if openness.is_finite() { openness } else { f32::NAN };
+        *v = if declared.means == Means::Occlusion { 1.0 - light } else { light };
     }
     if let Some(why) = beyond(&values) {
         warnings.push(why);
@@ -186,10 +183,11 @@ fn openness(
 
 /// Says where openness leaves its range.
 fn beyond(values: &[f32]) -> Option<String> {
-    let is_beyond = |v: &&f32| !v.is_nan() && !(-BEYOND..=1.0 + BEYOND).contains(*v);
+    let is_beyond = |v: &&f32| v.is_finite() && !(-BEYOND..=1.0 + BEYOND).contains(*v);
     let count = values.iter().filter(is_beyond).count();
-    let least = values.iter().copied().fold(f32::INFINITY, f32::min);
-    let most = values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let finite = || values.iter().copied().filter(|v| v.is_finite());
+    let least = finite().fold(f32::INFINITY, f32::min);
+    let most = finite().fold(f32::NEG_INFINITY, f32::max);
     (count > 0).then(|| format!("openness lies outside 0 to 1 at {count} pixels: it is {least} to {most}"))
 }
 
@@ -422,13 +420,15 @@ mod tests {
         (image[3], image[30], image[31]) = (f32::NAN, f32::INFINITY, f32::NAN);
         let path = files.exr(VIEW, &[("ao", image)]);
         let taken = read(&path, &Declared::default(), VIEW).unwrap();
-        assert!(taken.replicates[0][30].is_nan());
-        let mut seen = vec![true; 240];
-        seen[3] = false;
-        let message = taken.check(&path, &seen, 24).unwrap_err().to_string();
+        assert!(taken.replicates[0][30].is_infinite() && taken.warnings.is_empty(), "{:?}", taken.warnings);
+        let mut seen = vec![0.5; 240];
+        seen[3] = f32::NAN;
+        let check = |seen: &[f32]| check_numbers(&path, &taken.replicates[0], seen, 24).map_err(|e| e.to_string());
+        let message = check(&seen).unwrap_err();
         assert!(message.contains("2 pixels") && message.contains("column 6, row 1"), "{message}");
-        (seen[30], seen[31]) = (false, false);
-        assert!(taken.check(&path, &seen, 24).is_ok());
+        (seen[30], seen[31]) = (f32::NAN, f32::NAN);
+        assert_eq!(check(&seen), Ok(()));
+        assert!(check(&[]).unwrap_err().contains("3 pixels"));
     }
 
     #[test]

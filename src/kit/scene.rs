@@ -6,7 +6,8 @@ use crate::{
     layers::Layers,
     metrics::regions::{Region, Regions},
     render::{Geometry, RenderError, gbuffer::GBuffer},
-    scenes::{Scene, SceneError, Sky, gltf, views_json},
+    scene_files,
+    scenes::{Scene, SceneError, Sky},
 };
 use std::{io::Write, path::Path};
 
@@ -39,17 +40,10 @@ pub enum KitError {
 /// Where a file cannot be written or the scene is too deep to trace.
 pub fn write(scene: &Scene, folder: &Path) -> Result<(), KitError> {
     let render = of_scene(scene);
-    let glb = |scene: &Scene, file: String| {
-        write_whole(&folder.join(file), |out| gltf::write_glb(scene, out).map_err(std::io::Error::other))
-    };
-    glb(scene, format!("{}.glb", scene.name))?;
+    scene_files::write(scene, folder)?;
     if scene.has_occluder() {
-        glb(&scene.twin(), format!("{}.twin.glb", scene.name))?;
+        scene_files::write_glb(&scene.twin(), &folder.join(format!("{}.twin.glb", scene.name)))?;
     }
-    let file = scene.model_toml(&format!("{}.glb", scene.name))?;
-    write_whole(&folder.join(format!("{}.toml", scene.name)), |out| out.write_all(file.as_bytes()))?;
-    let views = views_json(scene);
-    write_whole(&folder.join("views.json"), |out| out.write_all(views.as_bytes()))?;
     let geometry = Geometry::new(scene).map_err(render)?;
     let view = scene.measure.view();
     let gbuffer = GBuffer::new(&geometry.tracer, &view);

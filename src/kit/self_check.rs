@@ -11,9 +11,11 @@ use crate::{
     layers::{Layers, srgb, write_png},
     render::{Estimator, Geometry, Job, Renderer, cpu::Cpu},
     scenes::{AoScale, Scene},
-    score::self_check::{FILE, OPENNESS, SCALED, SCENE},
+    score::self_check::{OPENNESS, SCALED, SCENE},
 };
 use std::path::Path;
+
+pub(super) use crate::score::self_check::FILE;
 
 /// Rays of the references.
 const RAYS: u32 = 256;

@@ -57,11 +57,12 @@ pub fn write_suite(
     let plan =
         format!("{}\n{}\n", prepared.identity(&means.machine), crate::judge_cache::program().unwrap_or_default());
     let work = RecordFolder::resume(&folder.join(WORK), &plan)?;
-    let references = prepared.write_references(means, &work, &folder.join(SCORING), observer)?;
+    let scoring = folder.join(SCORING);
+    self_check::write(prepared.seed(), &folder.join(SCENES), &scoring)?;
+    let references = prepared.write_references(means, &work, (&scoring, &[self_check::FILE]), observer)?;
     for scene in &suite.scenes {
         scene::write(scene, &folder.join(SCENES).join(&scene.name))?;
     }
-    self_check::write(prepared.seed(), &folder.join(SCENES), &folder.join(SCORING))?;
     let scenes = references.scenes.into_iter();
     let manifest = Manifest::new(suite, scenes.map(|s| ManifestScene::new(SCENES, s.facts)).collect());
     let path = folder.join("README.md");

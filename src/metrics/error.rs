@@ -133,6 +133,10 @@ pub fn renderer_difference(own: &[Vec<f32>], cpu: &[Vec<f32>], regions: &Regions
 /// statistics rest on it, and none shows it: with one seed for all they find no
 /// variance, and are sure of whatever they see.
 pub fn distinct_replicates(replicates: &[Vec<f32>]) -> Metric {
+    if replicates.len() < 2 {
+        let why = "there is one image alone, and nothing that it could differ from";
+        return Metric::new(MetricName::DistinctReplicates, None, Err(Absent(why.into())));
+    }
     let bits = |image: &[f32]| image.iter().map(|v| v.to_bits()).collect::<Vec<u32>>();
     let distinct: HashSet<Vec<u32>> = replicates.iter().map(|r| bits(r)).collect();
     let (n, value) = (replicates.len() as f64, distinct.len() as f64 / replicates.len() as f64);

@@ -14,7 +14,8 @@ pub enum End {
     Fail,
     /// The data do not decide a gate.
     Inconclusive,
-    /// The suite has gates, and none of them was held against anything.
+    /// The suite has gates, and none of them was held against anything; of images that were handed
+    /// in: none against an image.
     Nothing,
     /// Every gate passes; those known to fail do.
     Pass,
@@ -39,6 +40,9 @@ impl Record {
         let s = Summary::new(&self.verdicts, &self.idle_gates, &self.scenes, &self.cases);
         if s.failed_cases + s.failed_judges > 0 || self.incomplete.is_some() {
             End::Incomplete
+        } else if self.handed_in.is_some() && self.has_judged_nothing() {
+            // What the kit's own judge passes or fails says nothing of the images.
+            End::Nothing
         } else if s.fail > 0 {
             End::Fail
         } else if s.inconclusive > 0 {

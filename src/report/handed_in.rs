@@ -1,10 +1,10 @@
-//! What must be known of images that were handed in, a sentence each.
+//! What must be known of images that were handed in, or that external renderers left, a sentence each.
 
 use crate::record::{Intervals, Record, Shows};
 
-/// What is said of a record of such images before its numbers; nothing of others.
+/// What is said of a record of such images before its numbers; nothing of our own.
 pub fn notes(record: &Record) -> Vec<String> {
-    let Some(by) = &record.handed_in else { return Vec::new() };
+    let Some(by) = &record.handed_in else { return record.doubts() };
     let mut notes = vec![format!(
         "These are images of the renderer '{}', handed in and scored against a kit ({}). Nothing was rendered here; pictures \
          from the look view are the kit's own.",
@@ -37,8 +37,6 @@ pub fn notes(record: &Record) -> Vec<String> {
             tiles.join(", ")
         ));
     }
-    for (id, source) in record.cases.iter().filter_map(|c| Some((c.case.id(), c.source.as_ref()?))) {
-        notes.extend(source.warnings.iter().map(|w| format!("{id}: {w}")));
-    }
+    notes.extend(record.doubts());
     notes
 }

@@ -41,6 +41,7 @@ pub(super) fn html(review: &Review, token: &str) -> Result<String, ReportError> 
             (_, _, 1..) => "inconclusive",
             _ => "pass",
         },
+        label: None,
         summary: format!(
             "{pass} hold, {fail} differ, {blind} too noisy to tell, {missing} missing or unusable, {lost} lost"
         ),
@@ -109,6 +110,7 @@ fn item(
         scene: of.scene.clone(),
         estimator: of.estimator.clone(),
         renderer: of.renderer.clone(),
+        origin: None,
         rays: of.rays,
         outcome: review.outcome(&checked.case),
         words: checked.text(),

@@ -11,6 +11,9 @@ pub enum RunError {
     /// A file could not be written.
     #[error(transparent)]
     Disk(#[from] DiskError),
+    /// What images are scored against could not be read.
+    #[error(transparent)]
+    Kit(DiskError),
     /// The CPU reference could not render, so there is nothing to compare with.
     #[error("scene '{scene}': {source}")]
     Render {

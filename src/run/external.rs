@@ -7,18 +7,21 @@ use super::{
 };
 use crate::{
     disk::{DiskError, write_whole},
+    intake::{Finding, Reference, diagnose},
     layers::pixel_hash,
+    metrics::regions::{Region, Regions},
     render::{
         Estimator,
         external::{Attempt, Capped, ExternalError, Ready, Shot},
     },
-    scenes::{AoScale, gltf, views_json},
+    scene_files::{self, SceneFiles},
+    scenes::AoScale,
     suite::Case,
 };
 use std::{
     fs,
     io::{self, Read, Write},
-    path::{Path, PathBuf},
+    path::Path,
 };
 
 /// Of a case's log, so many bytes are kept of its beginning and of its end.
@@ -27,9 +30,39 @@ const MOST: usize = 1 << 20;
 /// A scene on disk, as commands read it. It goes with this.
 pub(super) struct Handed {
     folder: tempfile::TempDir,
-    scene: PathBuf,
-    scene_toml: PathBuf,
-    views: PathBuf,
+    files: SceneFiles,
+}
+
+/// What is wrong with images that commands left, held against the converged image of their
+/// method over the pixels that see a surface, and what is doubtful in the first of them. Codes are doubtful
+/// alone where it `is_declared` what numbers stand for.
+pub(super) fn diagnosed(
+    images: &[Vec<f32>],
+    converged: &[f32],
+    regions: &Regions,
+    size: [u32; 2],
+    is_declared: bool,
+) -> [Vec<String>; 2] {
+    let mut openness = vec![f32::NAN; converged.len()];
+    for &i in regions.pixels(Region::All) {
+        openness[i as usize] = converged[i as usize];
+    }
+    let reference = Reference { openness, scaled: Vec::new() };
+    let (mut wrong, mut doubtful) = (Vec::new(), Vec::new());
+    for (replicate, image) in images.iter().enumerate() {
+        for finding in diagnose(image, &reference, size.map(|side| side as usize)) {
+            let is_doubt = finding.is_doubt() || is_declared && matches!(finding, Finding::Encoded { .. });
+            if !is_doubt {
+                wrong.push(format!("replicate {replicate}: {finding}"));
+            } else if replicate == 0 {
+                doubtful.push(finding.to_string());
+            }
+        }
+        if !wrong.is_empty() {
+            break;
+        }
+    }
+    [wrong, doubtful]
 }
 
 /// One image and the seconds that its command took.
@@ -126,9 +159,9 @@ impl Studio<'_> {
         let method = set.subject.method(of.case);
         let ao = scale(&set.subject.plan.suite.methods[method].estimator, set.scene.ao);
         let shot = Shot {
-            scene: &of.handed.scene,
-            scene_toml: &of.handed.scene_toml,
-            views: &of.handed.views,
+            scene: &of.handed.files.glb,
+            scene_toml: &of.handed.files.toml,
+            views: &of.handed.files.views,
             estimator: &of.case.estimator,
             rays: of.case.rays,
             radii: [ao.radius, ao.secondary_radius],
@@ -159,16 +192,8 @@ impl Studio<'_> {
         fs::create_dir_all(&work).map_err(DiskError::io(&work, "create the folder"))?;
         let folder = tempfile::Builder::new().prefix("scene-").tempdir_in(&work);
         let folder = folder.map_err(DiskError::io(&work, "create a folder for the scene"))?;
-        let (set, name) = (self.set, &self.set.scene.name);
-        let scene = folder.path().join(format!("{name}.glb"));
-        write_whole(&scene, |out| gltf::write_glb(&set.scene, out).map_err(io::Error::other))?;
-        let file = set.scene.model_toml(&format!("{name}.glb"));
-        let file = file.map_err(|e| DiskError::content(&scene, e.to_string()))?;
-        let scene_toml = folder.path().join(format!("{name}.toml"));
-        write_whole(&scene_toml, |out| out.write_all(file.as_bytes()))?;
-        let views = folder.path().join("views.json");
-        write_whole(&views, |out| out.write_all(views_json(&set.scene).as_bytes()))?;
-        Ok(Handed { folder, scene, scene_toml, views })
+        let files = scene_files::write(&self.set.scene, folder.path())?;
+        Ok(Handed { folder, files })
     }
 }
 

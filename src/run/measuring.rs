@@ -3,6 +3,7 @@
 use super::{
     RunError,
     case_metrics::{Others, metrics},
+    external,
     journal::case_image,
     judging::{Judged, Unjudged},
     occluders::Occluder,
@@ -128,6 +129,12 @@ impl Subject<'_> {
                 }
             };
             let regions = self.regions(index);
+            let [wrong, warnings] = self.of_commands(case, replicates, &converged.mean, regions);
+            if !wrong.is_empty() {
+                let why = format!("its images are wrong: {}", wrong.join("; and: "));
+                records.push(CaseRecord::failed(case, why));
+                continue;
+            }
             let method = measured(replicates, converged, regions);
             let on_classic = self.plan.suite.classic_beside(case);
             let beside = truth(&on_classic).filter(|t| case.estimator != *classic && t.fault.is_none());
@@ -154,10 +161,20 @@ impl Subject<'_> {
                 looks: counts.look(case),
                 source: None,
                 log: None,
+                warnings,
                 occluders: self.by_occluder(index, &method, &classic_on, judged),
             });
         }
         records
+    }
+
+    /// What is wrong and what is doubtful in images that somebody else's program left; nothing in ours.
+    fn of_commands(&self, case: &Case, images: &[Vec<f32>], converged: &[f32], regions: &Regions) -> [Vec<String>; 2] {
+        let Some(by) = self.plan.suite.renderers.iter().find(|r| case.is_external() && r.file.name == case.renderer)
+        else {
+            return Default::default();
+        };
+        external::diagnosed(images, converged, regions, self.facts.resolution, by.external.image.encoding.is_some())
     }
 
     /// The metrics of a case under each occluder of several.

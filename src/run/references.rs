@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     disk::{DiskError, read_json, read_text, write_json, write_whole},
-    layers::Layers,
+    layers::{Layers, hex},
     metrics::{
         artifact::Converged,
         regions::{Region, Regions},
@@ -25,10 +25,12 @@ use crate::{
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 use std::{
     collections::BTreeMap,
     io::Write,
     path::{Path, PathBuf},
+    sync::{Arc, Mutex, PoisonError},
 };
 
 /// Version of the format, as it is written and read.
@@ -52,8 +54,28 @@ pub struct ReferencesFile {
     pub suite: String,
     /// Seed of the judge and the converged images.
     pub seed: u32,
+    /// SHA-256 of the suite beside this, without its gates.
+    pub suite_hash: String,
+    /// SHA-256 of other files beside this.
+    pub files: BTreeMap<String, String>,
     /// The scenes, in the suite's order.
     pub scenes: Vec<SceneReferences>,
+    /// SHA-256 of all of this but this.
+    pub sha256: String,
+}
+
+impl ReferencesFile {
+    /// What [`ReferencesFile::sha256`] must be.
+    fn seal(&self) -> Result<String, serde_json::Error> {
+        let plain = ReferencesFile { sha256: String::new(), ..self.clone() };
+        Ok(hex(&Sha256::digest(serde_json::to_string(&plain)?)))
+    }
+}
+
+/// What [`ReferencesFile::suite_hash`] must be.
+fn suite_hash(file: &SuiteFile) -> Result<String, serde_json::Error> {
+    let plain = SuiteFile { gates: Vec::new(), ..file.clone() };
+    Ok(hex(&Sha256::digest(serde_json::to_string(&plain)?)))
 }
 
 /// What there is of a scene; its images lie in a folder of its name.
@@ -103,6 +125,8 @@ pub struct References {
     folder: PathBuf,
     file: ReferencesFile,
     suite: Suite,
+    /// Images of scenes that are not loaded yet: each is read once.
+    read: Mutex<BTreeMap<PathBuf, Arc<Layers>>>,
 }
 
 /// The images of one scene's references.
@@ -115,7 +139,7 @@ pub(super) struct Loaded {
 
 impl Prepared<'_> {
     /// Renders the references of a plan and writes them into a folder. Returns the list of them. `work` holds what is
-    /// done, so that an unfinished one can go on.
+    /// done, so that an unfinished one can go on. What lies `beside` them in the folder already is listed, too.
     ///
     /// # Errors
     /// Where a file cannot be written, or something cannot be rendered; [`RunError::Stopped`] where it was asked to stop.
@@ -123,7 +147,7 @@ impl Prepared<'_> {
         &self,
         means: &Means<'_>,
         work: &RecordFolder,
-        folder: &Path,
+        (folder, beside): (&Path, &[&str]),
         observer: &dyn Observer,
     ) -> Result<ReferencesFile, RunError> {
         let cost = self.sets.iter().flat_map(|s| all_but_cases(s).into_iter().map(|u| super::step(s, &u).rays)).sum();
@@ -160,17 +184,27 @@ impl Prepared<'_> {
                 images,
             });
         }
-        let file = ReferencesFile {
+        let path = folder.join(SUITE);
+        let unwritten = |e: &dyn std::fmt::Display| DiskError::content(&path, format!("it cannot be written: {e}"));
+        let suite = toml::to_string_pretty(&without_programs(&self.plan.suite.file)).map_err(|e| unwritten(&e))?;
+        write_whole(&path, |buffer| buffer.write_all(suite.as_bytes()))?;
+        // As it will be read.
+        let suite: SuiteFile = toml::from_str(&suite).map_err(|e| unwritten(&e))?;
+        let mut files = BTreeMap::new();
+        for name in beside {
+            files.insert((*name).to_owned(), journal::sha256(&folder.join(name))?);
+        }
+        let mut file = ReferencesFile {
             version: VERSION,
             tool: env!("CARGO_PKG_VERSION").to_owned(),
             suite: self.plan.suite.name.clone(),
             seed: self.plan.seed,
+            suite_hash: suite_hash(&suite).map_err(|e| unwritten(&e))?,
+            files,
             scenes,
+            sha256: String::new(),
         };
-        let path = folder.join(SUITE);
-        let text = toml::to_string_pretty(&without_programs(&self.plan.suite.file))
-            .map_err(|e| DiskError::content(&path, format!("the suite cannot be written: {e}")))?;
-        write_whole(&path, |buffer| buffer.write_all(text.as_bytes()))?;
+        file.sha256 = file.seal().map_err(|e| unwritten(&e))?;
         write_json(&folder.join(FILE), &file, "the references")?;
         Ok(file)
     }
@@ -250,10 +284,19 @@ impl References {
         for scene in &file.scenes {
             scene.check().map_err(|why| DiskError::content(&path, why))?;
         }
+        if file.seal().ok().as_ref() != Some(&file.sha256) {
+            let why = "its content is not what it was written with: it was damaged or edited; export the kit anew";
+            return Err(DiskError::content(&path, why).into());
+        }
         let names: Vec<&str> = file.scenes.iter().map(|s| s.facts.name.as_str()).collect();
         let path = folder.join(SUITE);
         let suite = Suite::without_scenes(&file.suite, &path.display().to_string(), &read_text(&path)?, &names)?;
-        Ok(References { folder, file, suite })
+        if suite_hash(&suite.file).ok().as_ref() != Some(&file.suite_hash) {
+            let why = "something else than its gates was changed: the kit's images are not those of such a suite; export the \
+                       kit anew";
+            return Err(DiskError::content(&path, why).into());
+        }
+        Ok(References { folder, file, suite, read: Mutex::default() })
     }
 
     /// Where they lie.
@@ -284,7 +327,7 @@ impl References {
         let is_known = self.suite.methods.iter().any(|m| m.name == method);
         let Some(scene) = self.scene(scene).filter(|_| is_known) else { return Ok(None) };
         let file = converged(method);
-        let replicates = journal::replicates(&self.layers(scene, &file)?);
+        let replicates = journal::replicates(self.layers(scene, &file)?.as_ref());
         if replicates.len() != CONVERGED_REPLICATES as usize {
             let why = format!("it holds {} replicates, not {CONVERGED_REPLICATES}", replicates.len());
             return Err(DiskError::content(&self.path(scene, &file), why));
@@ -301,7 +344,30 @@ impl References {
         self.masks(scene, &layers, None, false)
     }
 
-    /// All images of a scene that are measured with.
+    /// What the judge sees of a scene's receiver, with the occluder in place; None where there is no judge.
+    ///
+    /// # Errors
+    /// As [`References::converged`].
+    pub fn light(&self, scene: &SceneReferences) -> Result<Option<Vec<f32>>, DiskError> {
+        if !scene.facts.has_occluder {
+            return Ok(None);
+        }
+        let pairs = journal::pairs(self.layers(scene, JUDGE)?.as_ref());
+        Ok(Some(Converged::new(pairs.into_iter().map(|p| p.with).collect()).mean))
+    }
+
+    /// An image beside the list of references, and where it lies.
+    ///
+    /// # Errors
+    /// As [`References::converged`].
+    pub fn beside(&self, name: &str) -> Result<(PathBuf, Layers), DiskError> {
+        let path = self.folder.join(name);
+        sound(&path, self.file.files.get(name))?;
+        let layers = Layers::read(&path)?;
+        Ok((path, layers))
+    }
+
+    /// All images of a scene that are measured with. They are not kept any longer.
     pub(super) fn load(&self, plan: &Plan<'_>, scene: &SceneReferences) -> Result<Loaded, DiskError> {
         let layers = self.layers(scene, REGIONS)?;
         let masks = |occluder, shown| self.masks(scene, &layers, occluder, shown);
@@ -316,7 +382,7 @@ impl References {
         }
         let mut rendered = Rendered { look: Some(Ok(())), ..Rendered::default() };
         if scene.facts.has_occluder {
-            let pairs = journal::pairs(&self.layers(scene, JUDGE)?);
+            let pairs = journal::pairs(self.layers(scene, JUDGE)?.as_ref());
             if pairs.len() < 2 {
                 return Err(DiskError::content(&self.path(scene, JUDGE), "it holds fewer than two replicates"));
             }
@@ -327,13 +393,16 @@ impl References {
                 rendered.truths.insert(index, Truth { converged, fault: None });
             }
         }
-        Ok(Loaded { regions: masks(None, false)?, occluders, on_screen, rendered })
+        let regions = masks(None, false)?;
+        let folder = self.folder.join(&scene.facts.name);
+        self.read.lock().unwrap_or_else(PoisonError::into_inner).retain(|path, _| !path.starts_with(&folder));
+        Ok(Loaded { regions, occluders, on_screen, rendered })
     }
 
     /// The reference pictures from the look view.
     pub(super) fn look(&self, scene: &SceneReferences) -> Result<Layers, DiskError> {
         let path = self.path(scene, LOOK);
-        self.sound(scene, LOOK)?;
+        sound(&path, scene.images.get(LOOK))?;
         Layers::read(&path)
     }
 
@@ -341,27 +410,21 @@ impl References {
         self.folder.join(&scene.facts.name).join(file)
     }
 
-    /// Refuses a file that is not the one the list tells of.
-    fn sound(&self, scene: &SceneReferences, file: &str) -> Result<(), DiskError> {
-        let path = self.path(scene, file);
-        let listed =
-            scene.images.get(file).ok_or_else(|| DiskError::content(&path, format!("{FILE} does not list it")))?;
-        if journal::sha256(&path)? != *listed {
-            let why = format!("the image is not the one that {FILE} tells of: it was damaged or replaced");
-            return Err(DiskError::content(&path, why));
-        }
-        Ok(())
-    }
-
     /// A file of images of the size of the measure view.
-    fn layers(&self, scene: &SceneReferences, file: &str) -> Result<Layers, DiskError> {
-        self.sound(scene, file)?;
+    fn layers(&self, scene: &SceneReferences, file: &str) -> Result<Arc<Layers>, DiskError> {
         let path = self.path(scene, file);
+        let known = || self.read.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(layers) = known().get(&path) {
+            return Ok(Arc::clone(layers));
+        }
+        sound(&path, scene.images.get(file))?;
         let layers = Layers::read(&path)?;
         let ([w, h], [vw, vh]) = (layers.resolution, scene.facts.resolution);
         if layers.resolution != scene.facts.resolution {
             return Err(DiskError::content(&path, format!("it is {w} x {h} pixels, the measure view {vw} x {vh}")));
         }
+        let layers = Arc::new(layers);
+        known().insert(path, Arc::clone(&layers));
         Ok(layers)
     }
 
@@ -384,6 +447,16 @@ impl References {
         }
         Ok(Regions::of_masks(|region| masks[region as usize]))
     }
+}
+
+/// Refuses a file that is not the one the list tells of, by its hash.
+fn sound(path: &Path, listed: Option<&String>) -> Result<(), DiskError> {
+    let listed = listed.ok_or_else(|| DiskError::content(path, format!("{FILE} does not list it")))?;
+    if journal::sha256(path)? != *listed {
+        let why = format!("the image is not the one that {FILE} tells of: it was damaged or replaced");
+        return Err(DiskError::content(path, why));
+    }
+    Ok(())
 }
 
 impl SceneReferences {

@@ -8,16 +8,18 @@ use super::{
     journal::{case_image, look_image},
     judging::{Judged, Unjudged},
     measuring::Counts,
-    references::{References, SceneReferences},
+    references::{References, SUITE, SceneReferences},
     rendering::{Images, Rendered, case_layers},
     set::measured,
     subject::Subject,
 };
 use crate::{
+    gate::Gate,
     layers::pixel_hash,
     metrics::{
         Absent, Metric, MetricName,
         artifact::{Converged, Method as Measured},
+        judge::{JudgedRegions, vague},
         regions::{Region, Regions},
         tiles,
     },
@@ -25,7 +27,7 @@ use crate::{
     render::Estimator,
     suite::{Case, Method, Plan, Platform, Suite, SuiteError},
 };
-use std::time::Instant;
+use std::{borrow::Cow, time::Instant};
 
 /// The images of one case, as they were handed in.
 #[derive(Clone, Debug)]
@@ -59,7 +61,7 @@ impl References {
     /// it, take the place of the suite's.
     ///
     /// # Errors
-    /// Where the gates are malformed, or name what is not there.
+    /// Where the gates are malformed, name what is not there, or can be held against nothing in the kit.
     pub fn ready<'a>(&'a self, handed: &'a [CaseImages], gates: Option<(&str, &str)>) -> Result<Ready<'a>, SuiteError> {
         let mut suite = self.suite().clone();
         let foreign = add_foreign(&mut suite, handed);
@@ -72,7 +74,33 @@ impl References {
             renderers.dedup();
             suite.replace_gates(label, text, &scenes, &renderers)?;
         }
+        if let Some(message) = self.idle(&suite.gates) {
+            let own = self.folder().join(SUITE).display().to_string();
+            let file = gates.map_or(own, |(label, _)| label.to_owned());
+            return Err(SuiteError::Invalid { file, message });
+        }
         Ok(Ready { references: self, handed, suite, foreign })
+    }
+}
+
+impl References {
+    /// Names a gate that is taken under an occluder where none of its scenes has one: whatever is handed in, it
+    /// would never be held against anything.
+    fn idle(&self, gates: &[Gate]) -> Option<String> {
+        let scenes = |gate: &Gate| {
+            let all = self.file().scenes.iter().map(|s| &s.facts);
+            all.filter(|s| gate.scenes.is_empty() || gate.scenes.contains(&s.name)).collect::<Vec<_>>()
+        };
+        let is_idle = |gate: &&Gate| gate.needs_occluder() && !scenes(gate).iter().any(|s| s.has_occluder);
+        let gate = gates.iter().find(is_idle)?;
+        let names: Vec<&str> = scenes(gate).iter().map(|s| s.name.as_str()).collect();
+        let region = gate.region.map_or(String::new(), |r| format!(" of {}", r.label()));
+        Some(format!(
+            "gate '{}': {}{region} is taken under an occluder, and none of its scenes has one: {}",
+            gate.name,
+            gate.metric.label(),
+            names.join(", ")
+        ))
     }
 }
 
@@ -106,7 +134,7 @@ impl Ready<'_> {
             if own.is_empty() {
                 continue;
             }
-            let loaded = references.load(&plan, scene)?;
+            let loaded = references.load(&plan, scene).map_err(RunError::Kit)?;
             let facts = scene.facts.clone();
             let mut rendered = loaded.rendered;
             let (regions, occluders, on_screen) = (loaded.regions, loaded.occluders, loaded.on_screen);
@@ -123,7 +151,7 @@ impl Ready<'_> {
                 cases.push(record);
             }
             scored.note(&mut rendered);
-            references.look(scene)?.write(&folder.path().join(look_image(&scene.facts.name)))?;
+            references.look(scene).map_err(RunError::Kit)?.write(&folder.path().join(look_image(&scene.facts.name)))?;
             scenes.push(subject.scene_record(folder, &rendered, &judged, &Counts::all(u32::MAX))?);
         }
         let gpu = format!("none was used: the images were handed in, of the renderer '{}'", by.renderer);
@@ -159,6 +187,13 @@ fn add_foreign(suite: &mut Suite, handed: &[CaseImages]) -> Vec<String> {
         }
     }
     foreign
+}
+
+/// What a case is measured against.
+struct Against<'a> {
+    judge: Result<&'a Cow<'a, JudgedRegions>, Absent>,
+    converged: &'a Converged,
+    rendered: &'a Rendered,
 }
 
 /// One scene with what was handed in of it.
@@ -199,8 +234,11 @@ impl Scored<'_> {
                 &foreign
             }
         };
-        let measure =
-            |images: &[Vec<f32>], regions: &Regions| self.metrics(handed, shows, images, regions, converged, rendered);
+        let judge = self.judge_on(index, &known, all, rendered);
+        let measure = |images: &[Vec<f32>], regions: &Regions| {
+            let against = Against { judge: judge.as_ref().map_err(Clone::clone), converged, rendered };
+            self.metrics(handed, shows, images, regions, &against)
+        };
         let is_one = handed.source.as_ref().is_some_and(|s| s.intervals == Intervals::Tiles);
         let metrics = match images.as_slice() {
             [one] if is_one => {
@@ -225,9 +263,29 @@ impl Scored<'_> {
             looks: None,
             replicates: Some(images.len() as u32),
             log: None,
+            warnings: Vec::new(),
             source: handed.source.clone(),
             occluders,
         }
+    }
+
+    /// The judge over the pixels that a case is measured on: where a ratio is not known in some, over
+    /// the others alone, as the case is.
+    fn judge_on(
+        &self,
+        index: usize,
+        known: &Regions,
+        all: &Regions,
+        rendered: &Rendered,
+    ) -> Result<Cow<'_, JudgedRegions>, Absent> {
+        let own = self.subject.judge_of(index, self.judged)?;
+        if Region::ALL.iter().all(|&r| known.pixels(r).len() == all.pixels(r).len()) {
+            return Ok(Cow::Borrowed(own));
+        }
+        let Some(Ok(pairs)) = &rendered.judge else { return Ok(Cow::Borrowed(own)) };
+        let judge = JudgedRegions::new(pairs, known)?;
+        let (found, wanted) = (judge.widest(), self.subject.plan.suite.file.judge.precision);
+        if found <= wanted { Ok(Cow::Owned(judge)) } else { Err(vague(found, pairs.len(), wanted)) }
     }
 
     /// Every metric over some regions.
@@ -237,10 +295,10 @@ impl Scored<'_> {
         shows: Shows,
         images: &[Vec<f32>],
         regions: &Regions,
-        converged: &Converged,
-        rendered: &Rendered,
+        against: &Against<'_>,
     ) -> Vec<Metric> {
         let case = &handed.case;
+        let &Against { ref judge, converged, rendered } = against;
         let method = measured(images, converged, regions);
         if shows == Shows::Frame {
             return method.contrasts().to_vec();
@@ -252,14 +310,14 @@ impl Scored<'_> {
         let others = Others {
             classic: beside,
             cpu: None,
-            judge: self.subject.judge_of(index, self.judged),
+            judge: judge.clone().map(|j| &**j),
             image: self.judged.as_ref().map_err(Unjudged::absent).and_then(Judged::image),
             occluder: self.subject.facts.has_occluder,
         };
         let mut metrics = metrics(&method, &others);
         if lacks_classic && self.subject.facts.has_occluder {
-            let why = "as many images of classic AO of this renderer were not handed in";
-            metrics.push(Metric::new(MetricName::Removed, None, Err(Absent(why.to_owned()))));
+            let why = self.no_classic(images.len());
+            metrics.push(Metric::new(MetricName::Removed, None, Err(Absent(why))));
         }
         if !rendered.truths.contains_key(&index) {
             let why = format!("the suite has no estimator '{}', so there is no converged image of it", case.estimator);
@@ -287,6 +345,28 @@ impl Scored<'_> {
         let as_many = theirs.filter_map(|h| Some((&h.case, h.images.as_ref().ok().filter(|i| i.len() == replicates)?)));
         let (_, images) = as_many.max_by_key(|(own, _)| (own.rays == case.rays, own.rays))?;
         Some(measured(images, &rendered.truths.get(&index)?.converged, regions))
+    }
+
+    /// Why a case of so many images has no classic AO to be compared with.
+    fn no_classic(&self, replicates: usize) -> String {
+        let suite = self.subject.plan.suite;
+        let name = &suite.methods[suite.classic()].name;
+        let theirs: Vec<&&CaseImages> = self.handed.iter().filter(|h| h.case.estimator == *name).collect();
+        let images = |n: usize| if n == 1 { "1 image".to_owned() } else { format!("{n} images") };
+        let counts: Vec<String> = theirs
+            .iter()
+            .filter(|h| h.is_openness())
+            .filter_map(|h| Some(images(h.images.as_ref().ok()?.len())))
+            .collect();
+        match (theirs.is_empty(), counts.is_empty()) {
+            (true, _) => format!("no image of classic AO ('{name}') of this renderer was handed in for this scene"),
+            (false, true) => format!("the images of classic AO ('{name}') cannot be used, or are whole frames"),
+            _ => format!(
+                "there are {} of this case and {} of classic AO ('{name}'): as many are needed",
+                images(replicates),
+                counts.join(" or ")
+            ),
+        }
     }
 
     /// Puts images of openness where profiles and convergence are taken from.

@@ -2,13 +2,20 @@
 
 use crate::{
     disk::{DiskError, read_text},
-    intake::{Declared, Means, Rows, Share, Upsample},
+    intake::{Curve, Declared, Means, Rows, Share, Upsample},
     metrics::image::Encoding,
     suite::is_taken,
 };
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-use std::path::Path;
+use serde::{
+    Deserialize, Deserializer, Serialize,
+    de::{self, DeserializeOwned, IntoDeserializer, Visitor},
+};
+use std::{
+    fmt,
+    marker::PhantomData,
+    path::{Path, PathBuf},
+};
 
 /// The file, in the folder of the images. Each field is an option of `aogauge score` too,
 /// which wins.
@@ -27,20 +34,60 @@ pub struct Declaration {
     pub rays: Option<u32>,
     /// What stored numbers stand for: `linear`, or `srgb` codes. Unless given, floats are
     /// linear, and of integers it is detected, with a warning.
+    #[serde(deserialize_with = "word")]
     pub encoding: Option<Encoding>,
     /// What a stored 1 means: `openness` unless given, or `occlusion`.
+    #[serde(deserialize_with = "word")]
     pub means: Option<Means>,
     /// The first row of a file: `top` of the view unless given, or `bottom`.
+    #[serde(deserialize_with = "word")]
     pub rows: Option<Rows>,
     /// How large images are beside the view: `full` unless given, `half` or `quarter`.
+    #[serde(deserialize_with = "word")]
     pub resolution: Option<Share>,
     /// How smaller ones are brought to its size: `nearest` unless given, or `bilinear`.
+    #[serde(deserialize_with = "word")]
     pub upsample: Option<Upsample>,
     /// The layer of OpenEXR files.
     pub layer: Option<String>,
     /// The curve that openness was sent through, gain * O^exponent, which is undone: none unless
     /// given; `fit` finds it on the control scenes.
     pub curve: Option<CurveChoice>,
+}
+
+/// A field that is one of a few words.
+trait Word: DeserializeOwned {
+    /// Them, for errors.
+    const WORDS: &'static str;
+}
+
+macro_rules! words {
+    ($($word:ty: $words:literal),*) => {$(
+        impl Word for $word {
+            const WORDS: &'static str = $words;
+        }
+    )*};
+}
+words!(
+    Encoding: r#""linear" or "srgb""#, Means: r#""openness" or "occlusion""#, Rows: r#""top" or "bottom""#,
+    Share: r#""full", "half" or "quarter""#, Upsample: r#""nearest" or "bilinear""#
+);
+
+/// Reads one, and says which there are where it is no word at all.
+fn word<'de, D: Deserializer<'de>, T: Word>(from: D) -> Result<Option<T>, D::Error> {
+    struct Words<T>(PhantomData<T>);
+    impl<T: Word> Visitor<'_> for Words<T> {
+        type Value = T;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str(T::WORDS)
+        }
+
+        fn visit_str<E: de::Error>(self, text: &str) -> Result<T, E> {
+            T::deserialize(text.into_deserializer())
+        }
+    }
+    from.deserialize_any(Words(PhantomData)).map(Some)
 }
 
 /// A curve to undo.
@@ -71,6 +118,13 @@ pub struct KnownCurve {
     pub exponent: f64,
 }
 
+impl KnownCurve {
+    /// To be undone.
+    pub(super) fn curve(&self) -> Curve {
+        Curve { gain: self.gain, exponent: self.exponent, ..Curve::IDENTITY }
+    }
+}
+
 impl Declaration {
     /// Reads the file of a folder; nothing is declared where there is none.
     ///
@@ -79,7 +133,13 @@ impl Declaration {
     pub fn read(folder: &Path) -> Result<Self, DiskError> {
         let path = folder.join(FILE);
         if !path.exists() {
-            return Ok(Self::default());
+            return match misspelt(folder) {
+                None => Ok(Self::default()),
+                Some(other) => {
+                    let why = format!("a file of declarations is called {FILE}, in lower case: rename it");
+                    Err(DiskError::content(&other, why))
+                }
+            };
         }
         toml::from_str(&read_text(&path)?).map_err(|e| DiskError::content(&path, e.to_string()))
     }
@@ -143,9 +203,27 @@ impl Declaration {
     }
 }
 
+/// A file that is called like the declarations, but for upper and lower case: where the system
+/// tells them apart, it would be passed over.
+fn misspelt(folder: &Path) -> Option<PathBuf> {
+    let entries = std::fs::read_dir(folder).ok()?.flatten();
+    entries.map(|e| e.path()).find(|p| p.file_name().is_some_and(|n| n.eq_ignore_ascii_case(FILE)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_file_in_another_case_is_not_passed_over() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(Declaration::read(folder.path()).unwrap(), Declaration::default());
+        std::fs::write(folder.path().join("Score.toml"), "rays = 4").unwrap();
+        match Declaration::read(folder.path()) {
+            Err(e) => assert!(e.to_string().contains("Score.toml: a file of declarations is called score.toml"), "{e}"),
+            Ok(read) => assert_eq!(read.rays, Some(4), "this system does not tell them apart"),
+        }
+    }
 
     #[test]
     fn the_file_is_read_whole_and_options_win() {
@@ -173,6 +251,11 @@ mod tests {
             ("curve = { gain = 1, exponent = nan }", "curve.exponent is NaN"),
             ("curve = 'fitted'", "curve must be \"fit\""),
             ("means = 'ao'", "openness"),
+            ("resolution = 0.5", "`0.5`, expected \"full\", \"half\" or \"quarter\""),
+            ("resolution = 'third'", "expected one of `full`, `half`, `quarter`"),
+            ("upsample = true", "expected \"nearest\" or \"bilinear\""),
+            ("rows = 1", "expected \"top\" or \"bottom\""),
+            ("encoding = 2.2", "expected \"linear\" or \"srgb\""),
             ("gamma = 2.2", "gamma"),
         ] {
             let parsed = toml::from_str::<Declaration>(text).map_err(|e| e.to_string());

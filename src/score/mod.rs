@@ -10,14 +10,17 @@ pub use declaration::{CurveChoice, Declaration, FILE, Fit, KnownCurve};
 
 use crate::{
     disk::DiskError,
-    intake::{self, Defaults, IntakeError},
+    intake::{self, Defaults, Handed, IntakeError},
     record::{HandedIn, UndoneCurve},
     run::{CaseImages, References, ReferencesError},
     suite::{Case, is_taken},
 };
 use reading::Reader;
 use self_check::SCENE as SELF_CHECK;
-use std::{collections::BTreeSet, path::Path};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
 /// Why images cannot be scored.
 #[derive(Debug, thiserror::Error)]
@@ -74,58 +77,143 @@ pub fn gather(
     let mut scenes: Vec<&str> = file.scenes.iter().map(|s| s.facts.name.as_str()).collect();
     scenes.push(SELF_CHECK);
     let estimators: Vec<&str> = references.suite().methods.iter().map(|m| m.name.as_str()).collect();
-    let defaults = Defaults { estimator: declaration.estimator.clone(), rays: declaration.rays };
+    let free = Some(SELF_CHECK.to_owned());
+    let defaults = Defaults { estimator: declaration.estimator.clone(), rays: declaration.rays, free };
     let found = intake::files(folder, &scenes, &estimators, &defaults)?;
     let mut warnings = found.warnings;
-    let renderer = declaration.renderer.clone().unwrap_or_else(|| name_of(folder));
-    let reader = Reader { folder, references, declared: declaration.of_images() };
+    let renderer = match &declaration.renderer {
+        Some(name) => name.clone(),
+        None => {
+            let (name, told) = name_of(folder);
+            warnings.extend(told);
+            name
+        }
+    };
+    // A curve that is found on the images later explains codes, too.
+    let is_fitted = matches!(declaration.curve, Some(CurveChoice::Fit(_)));
+    let mut reader = Reader { folder, references, declared: declaration.of_images(), is_declared: is_fitted };
     let (checks, handed): (Vec<_>, Vec<_>) = found.cases.into_iter().partition(|c| c.scene == SELF_CHECK);
-    warnings.extend(self_check::check(&reader, &checks)?);
+    let known = match &declaration.curve {
+        Some(CurveChoice::Known(known)) => Some(known.curve()),
+        _ => None,
+    };
+    let doubts = self_check::check(&reader, known, &checks)?;
+    reader.is_declared = declaration.encoding.is_some();
     if handed.is_empty() {
         let scenes = scenes[..scenes.len() - 1].join(", ");
-        let what = if warnings.is_empty() { String::new() } else { format!(" ({})", warnings.join(" ")) };
-        return Err(ScoreError::Nothing(format!(
-            "{}: no image is called like a scene of the kit{what}; names are SCENE.ESTIMATOR.RAYS.REPLICATE.exr, the \
-             scenes {scenes}",
+        let what = format!(
+            "{}: no image is called like a scene of the kit; names are SCENE.ESTIMATOR.RAYS.REPLICATE.exr, the scenes {scenes}",
             folder.display()
-        )));
+        );
+        return Err(ScoreError::Nothing(lines(what, &warnings)));
+    }
+    check_used(declaration, &handed).map_err(ScoreError::Declared)?;
+    if let Some(own) = declaration.estimator.as_deref().filter(|own| !estimators.contains(own)) {
+        let known = estimators.join(", ");
+        warnings
+            .push(format!("The estimator '{own}' is none of the kit's ({known}): of it there is no converged image."));
     }
     // A slip in a name must not leave out what was to be judged.
     if found.not_taken > 0 && !is_partial {
-        return Err(ScoreError::NotTaken(format!(
-            "{} images are {}; an estimator that the kit does not have is named by --estimator; --partial leaves them out",
-            found.not_taken,
-            warnings.join("; ")
-        )));
+        let what = format!(
+            "{}: {} images are not taken; an estimator that the kit does not have is named by --estimator; --partial leaves \
+             such images out",
+            folder.display(),
+            found.not_taken
+        );
+        return Err(ScoreError::NotTaken(lines(what, &warnings)));
     }
+    warnings.extend(doubts);
     let mut cases: Vec<CaseImages> = handed.iter().map(|h| reader.case(h, &renderer)).collect();
     let curve = undo_curve(&mut cases, references, declaration)?;
     for case in &mut cases {
         reader.diagnose(case)?;
     }
     if !is_partial {
-        cases.extend(missing(&cases, references));
+        let strays = strays(&handed);
+        warnings.extend(strays.iter().map(|h| stray(h, folder)));
+        let strays: Vec<(&str, u32)> = strays.iter().map(|h| (h.estimator.as_str(), h.rays)).collect();
+        cases.extend(missing(&cases, references, &strays));
     }
     let kit = format!("aogauge {}, suite {}, seed {}", file.tool, file.suite, file.seed);
     Ok(Gathered { cases, handed_in: HandedIn { renderer, kit, curve, warnings } })
 }
 
-/// A legal name from that of a folder.
-fn name_of(folder: &Path) -> String {
+/// Refuses an estimator or a number of rays that is declared and that no image is of: the
+/// names of files win, and what was declared may be a slip.
+fn check_used(declaration: &Declaration, handed: &[Handed]) -> Result<(), String> {
+    let counted = |of: &dyn Fn(&Handed) -> String| {
+        let mut found: BTreeMap<String, usize> = BTreeMap::new();
+        for h in handed {
+            *found.entry(of(h)).or_default() += h.images.len();
+        }
+        found.into_iter().map(|(what, n)| format!("{what} ({n} files)")).collect::<Vec<_>>().join(", ")
+    };
+    let unused = |field: &str, value: &str, found: String| {
+        Err(format!(
+            "{field} is {value}, but no image is of it: the files' names say {found}, and they win; correct it or leave it out"
+        ))
+    };
+    if let Some(own) = declaration.estimator.as_ref().filter(|own| !handed.iter().any(|h| h.estimator == **own)) {
+        return unused("estimator", &format!("'{own}'"), counted(&|h| h.estimator.clone()));
+    }
+    if let Some(own) = declaration.rays.filter(|own| !handed.iter().any(|h| h.rays == *own)) {
+        return unused("rays", &own.to_string(), counted(&|h| h.rays.to_string()));
+    }
+    Ok(())
+}
+
+/// A sentence, and further ones on lines of their own.
+fn lines(what: String, more: &[String]) -> String {
+    more.iter().fold(what, |text, line| format!("{text}\n  {line}"))
+}
+
+/// Cases of a ray count that less than half as many scenes have as another one of the same
+/// estimator: a slip in a name more likely than a plan, of which no other scene's images are missed.
+fn strays(handed: &[Handed]) -> Vec<&Handed> {
+    let scenes =
+        |estimator: &str, rays: u32| handed.iter().filter(|h| h.estimator == estimator && h.rays == rays).count();
+    let is_stray = |h: &&Handed| {
+        let others = handed.iter().filter(|o| o.estimator == h.estimator).map(|o| scenes(&o.estimator, o.rays));
+        2 * scenes(&h.estimator, h.rays) < others.max().unwrap_or(0)
+    };
+    handed.iter().filter(is_stray).collect()
+}
+
+/// What is said of one.
+fn stray(h: &Handed, folder: &Path) -> String {
+    let file = h.images.first().map(|i| i.path.strip_prefix(folder).unwrap_or(&i.path).display().to_string());
+    format!(
+        "{}: of {}, {} rays are in few scenes only: this case is scored, and others of so many rays are not missed",
+        crate::untrusted::line(&file.unwrap_or_default()),
+        h.estimator,
+        h.rays
+    )
+}
+
+/// A legal name from that of a folder, and what is said where it is another.
+fn name_of(folder: &Path) -> (String, Option<String>) {
     let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
     let name = whole.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let legal: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(64).collect();
-    match aogauge_scenes::check_name(&legal) {
+    let is_legal = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    let legal: String = name.chars().map(|c| if is_legal(c) { c } else { '-' }).take(64).collect();
+    let legal = match aogauge_scenes::check_name(&legal) {
         // The names of our own renderers are not free.
         Ok(()) if !is_taken(&legal) => legal,
         _ => "handed-in".to_owned(),
-    }
+    };
+    let told = (legal != name).then(|| {
+        let name = crate::untrusted::line(&name);
+        format!("The renderer is called '{legal}': '{name}', as the folder is, cannot be its name; --renderer gives another.")
+    });
+    (legal, told)
 }
 
 /// Cases that the images of other scenes ask for.
-fn missing(cases: &[CaseImages], references: &References) -> Vec<CaseImages> {
+fn missing(cases: &[CaseImages], references: &References, strays: &[(&str, u32)]) -> Vec<CaseImages> {
     let kinds: BTreeSet<(&str, &str, u32)> =
         cases.iter().map(|c| (c.case.estimator.as_str(), c.case.renderer.as_str(), c.case.rays)).collect();
+    let kinds: Vec<_> = kinds.into_iter().filter(|(e, _, rays)| !strays.contains(&(e, *rays))).collect();
     let mut missing = Vec::new();
     for scene in &references.file().scenes {
         for &(estimator, renderer, rays) in &kinds {
@@ -156,8 +244,7 @@ fn undo_curve(
     let (curve, undone) = match &declaration.curve {
         None => return Ok(None),
         Some(CurveChoice::Known(known)) => {
-            let curve = intake::Curve { gain: known.gain, exponent: known.exponent, ..intake::Curve::IDENTITY };
-            (curve, UndoneCurve { gain: known.gain, exponent: known.exponent, rmse: None, scenes: Vec::new() })
+            (known.curve(), UndoneCurve { gain: known.gain, exponent: known.exponent, rmse: None, scenes: Vec::new() })
         }
         Some(CurveChoice::Fit(_)) => fit(cases, references)?,
     };
@@ -181,11 +268,11 @@ fn fit(cases: &[CaseImages], references: &References) -> Result<(intake::Curve, 
         let Ok(images) = &case.images else { continue };
         if let Some(converged) = references.converged(&case.case.scene, &case.case.estimator)? {
             scenes.insert(case.case.scene.clone());
-            known.push((images, converged.mean));
+            known.push((images, converged));
         }
     }
     let pairs: Vec<(&[f32], &[f32])> =
-        known.iter().flat_map(|(images, mean)| images.iter().map(|i| (i.as_slice(), mean.as_slice()))).collect();
+        known.iter().flat_map(|(images, c)| images.iter().map(|i| (i.as_slice(), c.mean.as_slice()))).collect();
     let names = || scenes.iter().cloned().collect::<Vec<_>>();
     let Some(curve) = intake::fit_curve(&pairs) else {
         let of = if scenes.is_empty() { "no control scene".to_owned() } else { names().join(", ") };
@@ -196,4 +283,38 @@ fn fit(cases: &[CaseImages], references: &References) -> Result<(intake::Curve, 
     };
     let (gain, exponent, rmse) = (curve.gain, curve.exponent, Some([curve.before, curve.after]));
     Ok((curve, UndoneCurve { gain, exponent, rmse, scenes: names() }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::intake::{HandedImage, Shown};
+
+    fn handed(scene: &str, estimator: &str, rays: u32) -> Handed {
+        let path = format!("mine/{scene}.{estimator}.{rays}.exr").into();
+        let image = HandedImage { replicate: None, shown: Shown::Openness, path, without: None };
+        Handed { scene: scene.into(), estimator: estimator.into(), rays, images: vec![image] }
+    }
+
+    /// One scene of three is a slip, one of two may be meant.
+    #[test]
+    fn a_ray_count_of_few_scenes_is_a_stray() {
+        let mut all: Vec<Handed> = ["a", "b", "c"].map(|s| handed(s, "classic", 4)).into();
+        all.extend([handed("a", "classic", 8), handed("b", "extended", 4), handed("a", "extended", 8)]);
+        let found = strays(&all);
+        assert_eq!(found, [&all[3]]);
+        let told = stray(found[0], Path::new("mine"));
+        assert!(told.starts_with("a.classic.8.exr: of classic, 8 rays are in few scenes only"), "{told}");
+        assert_eq!(strays(&all[1..]), [&handed("", "", 0); 0]);
+    }
+
+    #[test]
+    fn folders_lend_their_names_where_they_can() {
+        let name = |folder: &str| name_of(Path::new(folder));
+        assert_eq!(name("x/my_ao.v2"), ("my_ao.v2".into(), None));
+        let (legal, told) = name("x/my ao");
+        assert!(legal == "my-ao" && told.is_some_and(|t| t.contains("'my ao', as the folder is")));
+        let (legal, told) = name("x/CPU");
+        assert!(legal == "handed-in" && told.is_some_and(|t| t.contains("--renderer")));
+    }
 }

@@ -3,27 +3,46 @@
 use super::ScoreError;
 use crate::{
     disk::DiskError,
-    intake::{self, Declared, Finding, Handed, Reference, Shown},
+    intake::{self, Declared, Finding, Handed, HandedImage, Reference, Shown},
     metrics::regions::Region,
-    record::{Intervals, Shows, Source},
+    record::{Intervals, Shows, Source, told_once},
     run::{CaseImages, References},
     suite::Case,
 };
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Reads images as they are declared.
 pub(super) struct Reader<'a> {
     pub folder: &'a Path,
     pub references: &'a References,
     pub declared: Declared,
+    /// Whether codes that are not linear are meant to be so.
+    pub is_declared: bool,
 }
 
-/// Images of one case, and what there is to say of them.
-#[derive(Default)]
-struct Read {
-    images: Vec<Vec<f32>>,
+/// What a file, or a pair of them, holds.
+pub(super) struct Read {
+    /// Openness, or the light of a lone frame; an image a replicate. Of a pair, NaN where it is not known.
+    pub images: Vec<Vec<f32>>,
     encoding: String,
-    warnings: Vec<String>,
+    /// What there is to say of it, with the file.
+    pub warnings: Vec<(PathBuf, String)>,
+}
+
+/// What is wrong with images as a whole, and what is doubtful.
+#[derive(Default)]
+pub(super) struct Diagnosis {
+    pub wrong: Vec<String>,
+    pub doubtful: Vec<String>,
+}
+
+/// What files show, by the word in their names.
+pub(super) fn shows(shown: Option<Shown>) -> Shows {
+    match shown {
+        Some(Shown::With | Shown::Without) => Shows::Ratio,
+        Some(Shown::Frame) => Shows::Frame,
+        _ => Shows::Openness,
+    }
 }
 
 impl Reader<'_> {
@@ -35,16 +54,11 @@ impl Reader<'_> {
             renderer: renderer.to_owned(),
             rays: handed.rays,
         };
-        let shows = match handed.images.first().map(|i| i.shown) {
-            Some(Shown::With | Shown::Without) => Shows::Ratio,
-            Some(Shown::Frame) => Shows::Frame,
-            _ => Shows::Openness,
-        };
+        let shows = shows(handed.images.first().map(|i| i.shown));
         let files = handed.images.iter().flat_map(|i| [Some(&i.path), i.without.as_ref()].into_iter().flatten());
         let files = files.map(|path| self.relative(path)).collect();
-        let read = self.read(handed, shows);
-        let (images, encoding, warnings) = match read {
-            Ok(read) => (Ok(read.images), read.encoding, read.warnings),
+        let (images, encoding, warnings) = match self.all(handed) {
+            Ok(read) => (Ok(read.images), read.encoding, self.told(&read.warnings, handed.images.len())),
             Err(e) => (Err(e.to_string()), String::new(), Vec::new()),
         };
         let is_one = images.as_ref().is_ok_and(|i| i.len() == 1);
@@ -55,6 +69,12 @@ impl Reader<'_> {
 
     fn relative(&self, path: &Path) -> String {
         path.strip_prefix(self.folder).unwrap_or(path).display().to_string().replace('\\', "/")
+    }
+
+    /// Warnings of so many images, the same of several once; of all of them without their names.
+    pub fn told(&self, warnings: &[(PathBuf, String)], images: usize) -> Vec<String> {
+        let named: Vec<(String, String)> = warnings.iter().map(|(p, w)| (self.relative(p), w.clone())).collect();
+        told_once(&named, "files", images)
     }
 
     fn read_as(&self, shows: Shows, encoding: &str) -> String {
@@ -72,62 +92,59 @@ impl Reader<'_> {
         format!("{what}, {encoding}, rows from the {rows}{scaled}")
     }
 
-    fn read(&self, handed: &Handed, shows: Shows) -> Result<Read, ScoreError> {
+    fn all(&self, handed: &Handed) -> Result<Read, ScoreError> {
         let Some(scene) = self.references.scene(&handed.scene) else {
             return Err(ScoreError::Nothing(format!("the kit has no scene '{}'", handed.scene)));
         };
         let view = scene.facts.resolution;
-        let mut read = Read::default();
-        let mut warn = |file: &Path, text: String| {
-            let text = format!("{}: {text}", self.relative(file));
-            if !read.warnings.contains(&text) {
-                read.warnings.push(text);
-            }
-        };
-        let reference = match shows {
-            Shows::Openness => self.reference(&handed.scene, &handed.estimator)?,
-            Shows::Ratio | Shows::Frame => Reference::default(),
-        };
+        let reference = self.reference(&handed.scene, &handed.estimator)?;
+        let mut all = Read { images: Vec::new(), encoding: String::new(), warnings: Vec::new() };
         for image in &handed.images {
-            match (shows, &image.without) {
-                (Shows::Openness, _) => {
-                    let taken = intake::read_against(&image.path, &self.declared, view, &reference)?;
-                    taken.warnings.into_iter().for_each(|w| warn(&image.path, w));
-                    read.encoding = taken.encoding.label().to_owned();
-                    read.images.extend(taken.replicates);
-                }
-                (Shows::Ratio, Some(without)) => {
-                    let frame = |path| intake::frame(path, &self.declared, view);
-                    let (with, without) = (frame(&image.path)?, frame(without)?);
-                    let ratio = intake::ratio(&with, &without)?;
-                    read.encoding = with.encoding.label().to_owned();
-                    with.warnings.into_iter().chain(without.warnings).for_each(|w| warn(&image.path, w));
-                    if ratio.masked > 0 {
-                        let n = ratio.masked;
-                        warn(
-                            &image.path,
-                            format!("{n} pixels are too dark, too roughly rounded or cut off at white: left out"),
-                        );
-                    }
-                    if ratio.brighter > 0 {
-                        let n = ratio.brighter;
-                        warn(&image.path, format!("{n} pixels are brighter with AO than without it"));
-                    }
-                    read.images.push(ratio.openness);
-                }
-                _ => {
-                    let frame = intake::frame(&image.path, &self.declared, view)?;
-                    frame.warnings.into_iter().for_each(|w| warn(&image.path, w));
-                    warn(&image.path, intake::LONE_FRAME.to_owned());
-                    read.encoding = frame.encoding.label().to_owned();
-                    read.images.push(frame.light);
-                }
-            }
+            let read = self.image(image, view, &reference)?;
+            all.images.extend(read.images);
+            all.encoding = read.encoding;
+            all.warnings.extend(read.warnings);
         }
-        Ok(read)
+        Ok(all)
     }
 
-    /// What images of an estimator look like: its converged image, else that of classic AO.
+    /// One file, or a pair. Every surface that the reference sees must have a number in whole frames; of
+    /// openness the diagnosis tells.
+    pub fn image(&self, image: &HandedImage, view: [u32; 2], reference: &Reference) -> Result<Read, ScoreError> {
+        let mut warnings = Vec::new();
+        let mut warn = |path: &Path, text: String| warnings.push((path.to_owned(), text));
+        let frame = |path: &Path| {
+            let frame = intake::frame(path, &self.declared, view)?;
+            intake::check_numbers(path, &frame.light, &reference.openness, view[0] as usize)?;
+            Ok::<_, ScoreError>(frame)
+        };
+        let (images, encoding) = match (shows(Some(image.shown)), &image.without) {
+            (Shows::Openness, _) => {
+                let taken = intake::read_against(&image.path, &self.declared, view, reference)?;
+                taken.warnings.into_iter().for_each(|w| warn(&image.path, w));
+                (taken.replicates, taken.encoding)
+            }
+            (Shows::Ratio, Some(beside)) => {
+                let (with, without) = (frame(&image.path)?, frame(beside)?);
+                let ratio = intake::ratio(&with, &without)?;
+                ratio.check_order(&image.path, beside)?;
+                with.warnings.iter().for_each(|w| warn(&image.path, w.clone()));
+                without.warnings.iter().for_each(|w| warn(beside, w.clone()));
+                ratio.remarks().into_iter().for_each(|w| warn(&image.path, w));
+                (vec![ratio.openness], with.encoding)
+            }
+            _ => {
+                let frame = frame(&image.path)?;
+                frame.warnings.into_iter().for_each(|w| warn(&image.path, w));
+                warn(&image.path, intake::LONE_FRAME.to_owned());
+                (vec![frame.light], frame.encoding)
+            }
+        };
+        Ok(Read { images, encoding: encoding.label().to_owned(), warnings })
+    }
+
+    /// What images of an estimator look like, where the view sees a surface: its converged image, else that of
+    /// classic AO.
     pub fn reference(&self, scene: &str, estimator: &str) -> Result<Reference, DiskError> {
         let suite = self.references.suite();
         let known = self.references.converged(scene, estimator)?;
@@ -135,45 +152,106 @@ impl Reader<'_> {
             Some(own) => Some(own),
             None => self.references.converged(scene, &suite.methods[suite.classic()].name)?,
         };
-        Ok(Reference { openness: converged.map(|c| c.mean).unwrap_or_default(), scaled: Vec::new() })
+        let (Some(converged), Some(scene)) = (converged, self.references.scene(scene)) else {
+            return Ok(Reference::default());
+        };
+        let mut openness = vec![f32::NAN; converged.mean.len()];
+        for &i in self.references.regions(scene)?.pixels(Region::All) {
+            openness[i as usize] = converged.mean[i as usize];
+        }
+        Ok(Reference { openness, scaled: Vec::new() })
     }
 
     /// Ends a case whose images are wrong as a whole, and notes what is doubtful.
     pub fn diagnose(&self, case: &mut CaseImages) -> Result<(), ScoreError> {
-        let (Ok(images), true) = (&case.images, case.is_openness()) else { return Ok(()) };
+        let Ok(images) = &case.images else { return Ok(()) };
         let Some(scene) = self.references.scene(&case.case.scene) else { return Ok(()) };
-        let regions = self.references.regions(scene)?;
-        let mut reference = self.reference(&case.case.scene, &case.case.estimator)?;
-        // What the view does not show is not looked at.
-        let mut seen = vec![f32::NAN; reference.openness.len()];
-        for &i in regions.pixels(Region::All) {
-            seen[i as usize] = reference.openness[i as usize];
-        }
-        reference.openness = seen;
+        let reference = self.reference(&case.case.scene, &case.case.estimator)?;
         let size = scene.facts.resolution.map(|side| side as usize);
-        let mut wrong = Vec::new();
-        let mut doubtful = Vec::new();
+        let shows = case.source.as_ref().map_or(Shows::Openness, |s| s.shows);
+        let light = if shows == Shows::Frame { self.references.light(scene)? } else { None };
+        let mut found = Diagnosis::default();
         for (number, image) in images.iter().enumerate() {
-            for finding in intake::diagnose(image, &reference, size) {
-                let is_declared = matches!(finding, Finding::Encoded { .. }) && self.declared.encoding.is_some();
-                let is_doubt = finding.is_doubt() || is_declared;
-                // What is doubtful is so in all of them.
-                if is_doubt && number == 0 {
-                    doubtful.push(finding.to_string());
-                } else if !is_doubt {
-                    wrong.push(format!("image {number}: {finding}"));
-                }
+            let mut own = match shows {
+                Shows::Frame => of_frame(image, &reference, light.as_deref(), size),
+                _ => self.of_openness(image, &reference, size, shows),
+            };
+            if shows != Shows::Frame
+                && let Some(other) = self.rather(image, case, &reference)?
+            {
+                // What else is said of it compares it with the wrong scene.
+                own.wrong.retain(|w| w.starts_with("constant"));
+                own.wrong.insert(0, other);
+                own.doubtful.clear();
             }
-            if !wrong.is_empty() {
+            found.wrong.extend(own.wrong.into_iter().map(|w| format!("image {number}: {w}")));
+            // What is doubtful is so in all of them.
+            found.doubtful.extend(own.doubtful.into_iter().filter(|_| number == 0));
+            if !found.wrong.is_empty() {
                 break;
             }
         }
         if let Some(source) = &mut case.source {
-            source.warnings.extend(doubtful);
+            source.warnings.extend(found.doubtful);
         }
-        if !wrong.is_empty() {
-            case.images = Err(format!("its images are wrong: {}", wrong.join("; and: ")));
+        if !found.wrong.is_empty() {
+            case.images = Err(format!("its images are wrong: {}", found.wrong.join("; and: ")));
         }
         Ok(())
     }
+
+    /// What is wrong with openness. Where a ratio is not known, nothing is missing. Codes are doubtful alone
+    /// where it is declared what numbers stand for.
+    pub fn of_openness(&self, image: &[f32], reference: &Reference, size: [usize; 2], shows: Shows) -> Diagnosis {
+        let mut found = Diagnosis::default();
+        for finding in intake::diagnose(image, reference, size) {
+            let is_declared = matches!(finding, Finding::Encoded { .. }) && self.is_declared;
+            if shows == Shows::Ratio && matches!(finding, Finding::Holes { .. }) {
+                continue;
+            }
+            let to = if finding.is_doubt() || is_declared { &mut found.doubtful } else { &mut found.wrong };
+            to.push(finding.to_string());
+        }
+        found
+    }
+
+    /// Which other scene of the kit an image looks like, where it does not look like its own.
+    fn rather(&self, image: &[f32], case: &CaseImages, reference: &Reference) -> Result<Option<String>, ScoreError> {
+        let own = &case.case.scene;
+        let size = self.references.scene(own).map(|s| s.facts.resolution);
+        for other in self.references.file().scenes.iter().map(|s| &s.facts) {
+            if other.name == *own || Some(other.resolution) != size {
+                continue;
+            }
+            let like = self.reference(&other.name, &case.case.estimator)?;
+            if intake::is_rather(image, &reference.openness, &like.openness, other.resolution[0] as usize) {
+                return Ok(Some(format!(
+                    "it looks like the scene '{}' of the kit and not like '{own}': are the two exchanged?",
+                    other.name
+                )));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// What is wrong with a whole frame: that it holds nothing, and, where that is plain, that it lies otherwise.
+/// `light` is what the judge sees of the receiver.
+pub(super) fn of_frame(frame: &[f32], reference: &Reference, light: Option<&[f32]>, size: [usize; 2]) -> Diagnosis {
+    let mut found = Diagnosis::default();
+    let seen = || frame.iter().zip(&reference.openness).filter(|(_, r)| r.is_finite()).map(|(v, _)| *v);
+    let (least, most) = seen().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, m), v| (l.min(v), m.max(v)));
+    if most <= 0.0 {
+        found.wrong.push("black: no pixel that sees a surface has light; save the frame after it was drawn".to_owned());
+        return found;
+    }
+    if least < 0.0 {
+        let count = seen().filter(|v| *v < 0.0).count();
+        found.doubtful.push(format!("negative light: {count} pixels are below 0, the least is {least:.3}"));
+    }
+    let like: Vec<&[f32]> = std::iter::once(reference.openness.as_slice()).chain(light).collect();
+    if let Some(turn) = intake::frame_turn(frame, &like, size) {
+        found.doubtful.push(format!("it looks {}; {}", turn.title(), turn.remedy()));
+    }
+    found
 }

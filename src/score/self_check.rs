@@ -1,12 +1,15 @@
 //! One image by which a renderer shows that it draws the kit's scenes as they are meant.
 
-use super::{ScoreError, reading::Reader};
+use super::{
+    ScoreError,
+    reading::{Reader, of_frame, shows},
+};
 use crate::{
     disk::DiskError,
-    intake::{self, Handed, Reference, Scaled},
-    layers::Layers,
+    intake::{Curve, Handed, Reference, Scaled},
+    record::Shows,
+    run::References,
 };
-use std::path::Path;
 
 /// Its scene's name.
 pub const SCENE: &str = "self-check";
@@ -21,9 +24,8 @@ pub const OPENNESS: &str = "openness";
 pub const SCALED: &str = "scaled-";
 
 /// Reads the references.
-fn read(scoring: &Path) -> Result<(Reference, [u32; 2]), DiskError> {
-    let path = scoring.join(FILE);
-    let layers = Layers::read(&path)?;
+fn read(references: &References) -> Result<(Reference, [u32; 2]), DiskError> {
+    let (path, layers) = references.beside(FILE)?;
     let openness = layers.get(OPENNESS).map(<[f32]>::to_vec);
     let openness = openness.ok_or_else(|| DiskError::content(&path, format!("it lacks '{OPENNESS}'")))?;
     let scaled = layers.layers.iter().filter_map(|(name, values)| {
@@ -33,32 +35,43 @@ fn read(scoring: &Path) -> Result<(Reference, [u32; 2]), DiskError> {
     Ok((Reference { openness, scaled: scaled.collect() }, layers.resolution))
 }
 
-/// Looks at the images of the self-check. Returns what is doubtful.
+/// Looks at the images of the self-check, with a curve undone that is declared. Returns what is doubtful.
 ///
 /// # Errors
 /// [`ScoreError::SelfCheck`] where one is wrong.
-pub(super) fn check(reader: &Reader<'_>, handed: &[Handed]) -> Result<Vec<String>, ScoreError> {
+pub(super) fn check(reader: &Reader<'_>, curve: Option<Curve>, handed: &[Handed]) -> Result<Vec<String>, ScoreError> {
     if handed.is_empty() {
         return Ok(vec![format!(
             "There is no image of {SCENE}: whether images lie the right way round, are linear and take R in metres is known \
              as far as each scene tells."
         )]);
     }
-    let (reference, resolution) = read(reader.references.folder())?;
+    let (reference, resolution) = read(reader.references)?;
     let size = resolution.map(|side| side as usize);
-    let mut doubtful = Vec::new();
+    let mut warnings = Vec::new();
     for image in handed.iter().flat_map(|h| &h.images) {
-        let name = image.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        let taken = intake::read_against(&image.path, &reader.declared, resolution, &reference)?;
-        doubtful.extend(taken.warnings.into_iter().map(|w| format!("{name}: {w}")));
-        let (mut wrong, mut odd) = (Vec::new(), Vec::new());
-        for finding in taken.replicates.first().map(|i| intake::diagnose(i, &reference, size)).unwrap_or_default() {
-            if finding.is_doubt() { odd.push(finding.to_string()) } else { wrong.push(finding.to_string()) }
+        let wrong = |why: String| {
+            let name = image.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+            ScoreError::SelfCheck(format!("{name}: {why}"))
+        };
+        let read = reader.image(image, resolution, &reference).map_err(|e| match e {
+            ScoreError::Intake(e) => ScoreError::SelfCheck(e.to_string()),
+            other => other,
+        })?;
+        warnings.extend(read.warnings);
+        let shows = shows(Some(image.shown));
+        for values in &read.images {
+            let found = match (shows, curve) {
+                (Shows::Frame, _) => of_frame(values, &reference, None, size),
+                (_, Some(curve)) => reader.of_openness(&curve.undo(values), &reference, size, shows),
+                (_, None) => reader.of_openness(values, &reference, size, shows),
+            };
+            if !found.wrong.is_empty() {
+                return Err(wrong(found.wrong.join("; and: ")));
+            }
+            warnings.extend(found.doubtful.into_iter().map(|w| (image.path.clone(), w)));
         }
-        if !wrong.is_empty() {
-            return Err(ScoreError::SelfCheck(format!("{name}: {}", wrong.join("; and: "))));
-        }
-        doubtful.extend(odd.into_iter().map(|f| format!("{name}: {f}")));
     }
-    Ok(doubtful)
+    let images = handed.iter().map(|h| h.images.len()).sum();
+    Ok(reader.told(&warnings, images).into_iter().map(|w| format!("{SCENE}: {w}")).collect())
 }

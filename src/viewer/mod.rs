@@ -22,6 +22,8 @@ pub struct Page {
     pub title: String,
     /// What it came to: see [`Item::outcome`].
     pub outcome: &'static str,
+    /// What kind of images they are, where they are not our own; beside the outcome.
+    pub label: Option<String>,
     /// One sentence under the title.
     pub summary: String,
     /// What must be known before anything is read: an incomplete run, a filter.
@@ -53,6 +55,8 @@ pub struct Item {
     pub estimator: String,
     /// Its renderer.
     pub renderer: String,
+    /// Where its images come from, where they are not our own.
+    pub origin: Option<&'static str>,
     /// Rays a pixel in each replicate.
     pub rays: u32,
     /// `fail`, `error`, `inconclusive`, `warn`, `known`, `pass` or `none`.

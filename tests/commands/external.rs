@@ -352,6 +352,44 @@ mod scripts {
         assert!(!at.join("out/.aogauge-run").exists() && at.join("away/image.exr").exists());
     }
 
+    /// What a command leaves is looked at as images are that are handed in.
+    #[test]
+    fn images_that_are_wrong_as_a_whole_end_their_case() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = dir.path();
+        let [w, h] = aogauge::scenes::library::scene("corner").unwrap().measure.view().resolution;
+        let mut render = Command::new(AOGAUGE);
+        render.current_dir(at).args(["render", "corner", "--rays", "64", "--replicates", "2", "--out", "whole.exr"]);
+        assert!(render.status().unwrap().success());
+        let image = Layers::read(&at.join("whole.exr")).unwrap().get("replicate-0000").unwrap().to_vec();
+        let write = |name: &str, values: Vec<f32>| Layers::new([w, h]).with("Y", values).write(&at.join(name)).unwrap();
+        write("right.exr", image.clone());
+        write("inverted.exr", image.iter().map(|v| 1.0 - v).collect());
+        write("mirrored.exr", image.chunks(w as usize).flat_map(|r| r.iter().rev().copied()).collect());
+        write("codes.exr", image.iter().map(|v| v * 255.0).collect());
+        write("strong.exr", image.iter().map(|v| 1.0 - 1.5 * (1.0 - v)).collect());
+        let copy = |name: &str| renderer(name, &["cp", &format!("{{suite_folder}}/{name}.exr"), "{output}"], "");
+        let names = ["right", "inverted", "mirrored", "codes", "strong"];
+        let suite = SUITE.replace("\"plane\"", "\"corner\"") + &names.map(copy).concat();
+        let (code, record) = run(at, &suite, "--report markdown,html");
+        assert_eq!(code, Some(5), "{record}");
+        for (renderer, says) in [
+            ("inverted", "its images are wrong: replicate 0: inverted: 1 is closed; declare `means = \"occlusion\"`"),
+            ("mirrored", "flipped in x"),
+            ("codes", "divide by 255"),
+        ] {
+            let why = error(&record, renderer);
+            assert!(why.contains(says), "{renderer}: {why}");
+            assert_eq!(case(&record, renderer)["log"], format!("logs/corner/classic.{renderer}.4.log"));
+        }
+        let [right, strong] = ["right", "strong"].map(|r| case(&record, r));
+        assert!(right["error"].is_null() && right["warnings"].is_null(), "{right}");
+        let doubt = strong["warnings"][0].as_str().unwrap_or_else(|| panic!("{strong}"));
+        assert!(strong["error"].is_null() && doubt.starts_with("AO of strength 1."), "{doubt}");
+        let report = fs::read_to_string(at.join("out/report.md")).unwrap();
+        assert!(report.contains("corner/classic/strong/4: AO of strength"), "{report}");
+    }
+
     /// It fails once for each of two replicates.
     #[test]
     fn what_fails_now_and_then_is_tried_again() {

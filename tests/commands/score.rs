@@ -235,11 +235,17 @@ fn rows_upside_down(image: &[f32], width: usize) -> Vec<f32> {
 #[test]
 fn a_wrong_self_check_ends_it_at_once() {
     type Change = fn(&[f32], usize) -> Vec<f32>;
-    let cases: [(Change, &str); 5] = [
+    let cases: [(Change, &str); 8] = [
         (|i, w| rows_upside_down(i, w), "rows = \"bottom\""),
         (|i, w| i.chunks(w).flat_map(|row| row.iter().rev().copied()).collect(), "mirror"),
         (|i, _| i.iter().map(|v| 1.0 - v).collect(), "inverted"),
         (|i, _| i.iter().map(|v| v.max(0.0).powf(1.0 / 2.2)).collect(), "gamma-encoded"),
+        (|i, _| i.iter().map(|v| v * 255.0).collect(), "where openness is 0 to 1; divide by 255"),
+        (|i, _| i.iter().map(|v| 2.0 * v - 1.0).collect(), "negative openness"),
+        (
+            |i, _| i.iter().enumerate().map(|(k, v)| if k == 777 { f32::INFINITY } else { *v }).collect(),
+            "infinity: 1 pixels",
+        ),
         (|i, _| i.iter().enumerate().map(|(k, v)| if k == 777 { f32::NAN } else { *v }).collect(), "NaN"),
     ];
     for (change, says) in cases {
@@ -299,6 +305,12 @@ fn what_is_wrong_with_a_case_is_named() {
     // One of several is enough.
     let last = "corner.classic.4.0003.exr";
     check("image 3: inverted", &|images| images.exr(last, &first.iter().map(|v| 1.0 - v).collect::<Vec<_>>(), size));
+    check("constant: 1 everywhere", &|images| images.exr(name, &vec![1.0; first.len()], size));
+    check("infinity", &|images| {
+        let mut hole = first.clone();
+        hole[size[0] as usize + 3] = f32::INFINITY;
+        images.exr(name, &hole, size);
+    });
     check("NaN", &|images| {
         let mut hole = first.clone();
         hole[size[0] as usize + 3] = f32::NAN;
@@ -385,17 +397,29 @@ fn whole_frames_give_what_they_can() {
     for (r, image) in replicates.iter().enumerate() {
         lone.exr(&format!("curtain-arcade.classic.4.{r:04}.frame.exr"), image, size);
     }
-    lone.score(&["--partial"]);
+    // The gates of the suite are on dK, and a gate on the judge is none on the renderer.
+    let (code, text) = lone.score(&["--partial"]);
+    assert!(code == 4 && text.contains("nothing of the renderer was judged"), "{code}: {text}");
+    let gates = lone.out().with_extension("toml");
+    let of = |metric: &str| format!("[[gate]]\nname = '{metric}'\nmetric = '{metric}'\nmin = -50.0\n");
+    for (text, expected) in [(of("judge-contrast"), 4), (of("judge-contrast") + &of("contrast"), 0)] {
+        fs::write(&gates, text).unwrap();
+        let (code, text) = lone.score(&["--partial", "--gates", gates.to_str().unwrap()]);
+        assert_eq!(code, expected, "{text}");
+    }
+    fs::remove_file(&gates).unwrap();
     let record = lone.record();
     let own = case(&record, "curtain-arcade", "classic");
     assert_eq!(own.source.as_ref().unwrap().shows, Shows::Frame);
     let names: Vec<MetricName> = own.metrics.iter().map(|m| m.name).collect();
     assert_eq!(names, [MetricName::Contrast, MetricName::Michelson]);
-    // A frame without a number is none.
-    let nothing = Images::new();
-    nothing.exr("curtain-arcade.classic.4.0000.frame.exr", &vec![f32::NAN; replicates[0].len()], size);
-    let (code, text) = nothing.score(&["--partial"]);
-    assert!(code == 5 && text.contains("holds a number"), "{code}: {text}");
+    // A frame without a number is none, and one of black is none.
+    for (value, says) in [(f32::NAN, "hold NaN or infinity"), (0.0, "black: no pixel")] {
+        let nothing = Images::new();
+        nothing.exr("curtain-arcade.classic.4.0000.frame.exr", &vec![value; replicates[0].len()], size);
+        let (code, text) = nothing.score(&["--partial"]);
+        assert!(code == 5 && text.contains(says), "{code}: {text}");
+    }
     let report = fs::read_to_string(lone.out().join("report.md")).unwrap();
     assert!(report.contains("cannot be known"), "{report}");
 }
@@ -442,4 +466,314 @@ fn own_gates_and_own_estimators() {
     assert!(bias.value.is_none() && bias.note.as_ref().unwrap().contains("no estimator 'my-ao'"), "{bias:?}");
     assert!(!record.suite.methods.contains_key("my-ao"));
     fs::remove_file(gates).unwrap();
+}
+
+/// What is declared and no image is of is a slip, wherever it is declared.
+#[test]
+fn a_slip_in_what_is_declared_is_an_error() {
+    let images = Images::new();
+    images.all(|_, image, _| image.to_vec());
+    for (options, says) in [
+        (
+            ["--estimator", "clasic"],
+            "estimator is 'clasic', but no image is of it: the files' names say classic (8 files), extended (8 files)",
+        ),
+        (["--rays", "16"], "rays is 16, but no image is of it: the files' names say 4 (16 files)"),
+    ] {
+        let (code, text) = images.score(&options);
+        assert!(code == 2 && text.contains(says), "{code}: {text}");
+        assert!(!images.out().exists());
+    }
+    assert_eq!(images.score(&["--estimator", "classic", "--rays", "4"]).0, 0);
+    fs::write(images.folder.path().join("score.toml"), "estimator = 'clasic'").unwrap();
+    let (code, text) = images.score(&[]);
+    assert!(code == 2 && text.contains("'clasic'"), "{code}: {text}");
+    // The self-check needs neither.
+    fs::remove_file(images.folder.path().join("score.toml")).unwrap();
+    images.self_check(|image, _| image.to_vec());
+    let at = |name: &str| images.folder.path().join(name);
+    fs::rename(at("self-check.classic.16.exr"), at("self-check.exr")).unwrap();
+    let (code, text) = images.score(&[]);
+    assert!(code == 0 && !text.contains("self-check"), "{code}: {text}");
+}
+
+/// Frames with and without AO of the control, changed.
+fn pairs(images: &Images, change: impl Fn([Vec<f32>; 2], [u32; 2]) -> [Vec<f32>; 2]) {
+    let (replicates, size) = Images::of("corner", "classic");
+    for (r, image) in replicates.iter().enumerate() {
+        let without: Vec<f32> = (0..image.len()).map(|i| 0.3 + 0.1 * (i % 7) as f32).collect();
+        let with = image.iter().zip(&without).map(|(v, l)| v * l).collect();
+        let [with, without] = change([with, without], size);
+        images.exr(&format!("corner.classic.4.{r:04}.with.exr"), &with, size);
+        images.exr(&format!("corner.classic.4.{r:04}.without.exr"), &without, size);
+    }
+}
+
+fn mirrored(image: &[f32], width: u32) -> Vec<f32> {
+    image.chunks(width as usize).flat_map(|row| row.iter().rev().copied()).collect()
+}
+
+/// Whole frames can be as wrong as images of AO.
+#[test]
+fn what_is_wrong_with_whole_frames_is_named() {
+    type Change = fn([Vec<f32>; 2], [u32; 2]) -> [Vec<f32>; 2];
+    let cases: [(Change, &str); 4] = [
+        (|[with, without], _| [without, with], "are exchanged: "),
+        (|[a, b], [w, _]| [mirrored(&a, w), mirrored(&b, w)], "flipped in x"),
+        (
+            |[with, without], _| {
+                let codes = with.iter().zip(&without).map(|(a, b)| b * (a / b).max(0.0).powf(1.0 / 2.2));
+                [codes.collect(), without]
+            },
+            "gamma-encoded",
+        ),
+        (
+            |[mut with, without], _| {
+                with[700] = f32::NAN;
+                [with, without]
+            },
+            "1 pixels that see a surface hold NaN or infinity",
+        ),
+    ];
+    for (change, says) in cases {
+        let images = Images::new();
+        pairs(&images, change);
+        let (code, text) = images.score(&["--partial"]);
+        assert!(code == 5 && text.contains(says), "{says}: {code}: {text}");
+    }
+    let images = Images::new();
+    pairs(&images, |both, _| both);
+    // The kit has no gate on the control.
+    let (code, text) = images.score(&["--partial"]);
+    assert!(code == 4 && !text.contains("wrong"), "{code}: {text}");
+}
+
+/// The images of the self-check are read for what their names say.
+#[test]
+fn whole_frames_of_the_self_check_are_whole_frames() {
+    let images = Images::new();
+    pairs(&images, |both, _| both);
+    let layers = Layers::read(&world().join("self-check.exr")).unwrap();
+    let (image, size) = (layers.get("replicate-0000").unwrap(), layers.resolution);
+    let (times, light) = (|by: f32| image.iter().map(|v| by * v).collect::<Vec<f32>>(), vec![0.5; image.len()]);
+    let turned = |image: &[f32]| rows_upside_down(image, size[0] as usize);
+    for (with, without, code, says) in [
+        (times(0.5), light.clone(), 4, ""),
+        (light.clone(), times(0.5), 2, "are exchanged"),
+        (turned(&times(0.5)), light.clone(), 2, "rows = \"bottom\""),
+    ] {
+        images.exr("self-check.with.exr", &with, size);
+        images.exr("self-check.without.exr", &without, size);
+        let (found, text) = images.score(&["--partial"]);
+        assert!(found == code && text.contains(says), "{says}: {found}: {text}");
+        assert_eq!(text.contains("self-check image is wrong"), code == 2, "{text}");
+    }
+    for file in ["self-check.with.exr", "self-check.without.exr"] {
+        fs::remove_file(images.folder.path().join(file)).unwrap();
+    }
+    for (frame, code, says) in [
+        (times(3.0), 4, "A whole frame holds light"),
+        (turned(&times(3.0)), 4, "it looks flipped in y"),
+        (times(0.0), 2, "black"),
+    ] {
+        images.exr("self-check.frame.exr", &frame, size);
+        let (found, text) = images.score(&["--partial"]);
+        assert!(found == code && text.contains(says), "{says}: {found}: {text}");
+    }
+}
+
+/// The judge is taken over the pixels that the frames are known in.
+#[test]
+fn what_is_masked_is_masked_in_the_judge_too() {
+    let (replicates, size) = Images::of("curtain-arcade", "classic");
+    let record = |dark: bool| {
+        let images = Images::new();
+        for (r, image) in replicates.iter().enumerate() {
+            let light = |i: usize| if dark && (i / size[0] as usize) % 2 == 0 { 0.0 } else { 0.5 };
+            let with: Vec<f32> = image.iter().enumerate().map(|(i, v)| v * light(i)).collect();
+            let without: Vec<f32> = (0..image.len()).map(light).collect();
+            images.exr(&format!("curtain-arcade.classic.4.{r:04}.with.exr"), &with, size);
+            images.exr(&format!("curtain-arcade.classic.4.{r:04}.without.exr"), &without, size);
+        }
+        let (code, text) = images.score(&["--partial"]);
+        assert!(code == 0, "{text}");
+        assert_eq!(text.contains("pixels are too dark") && text.contains("all 4 files"), dark, "{text}");
+        images.record()
+    };
+    // K less dK is K(Q): over half of the rows another number, and near it.
+    let of = |record: &Record| {
+        let own = case(record, "curtain-arcade", "classic");
+        let value = |name| own.metric(name, None).unwrap().value.unwrap();
+        value(MetricName::Contrast) - value(MetricName::ContrastError)
+    };
+    let (whole, half) = (record(false), record(true));
+    assert!(of(&whole) != of(&half) && (of(&whole) - of(&half)).abs() < 0.2, "{} {}", of(&whole), of(&half));
+    let judge = whole.scenes[0].judge.as_ref().unwrap().contrast.value.unwrap();
+    assert!((of(&whole) - judge).abs() < 1e-9, "{} {judge}", of(&whole));
+}
+
+/// All that is read for a score is what the kit was written with.
+#[test]
+fn a_damaged_kit_is_exit_code_2_whatever_is_damaged() {
+    let images = Images::new();
+    images.all(|_, image, _| image.to_vec());
+    images.self_check(|image, _| image.to_vec());
+    let folder = tempfile::tempdir().unwrap();
+    let kit = folder.path().join("scoring");
+    let fresh = || {
+        let _ = fs::remove_dir_all(&kit);
+        copy_all(&world().join("kit/scoring"), &kit);
+    };
+    let score = || {
+        let [own, kit, out] = [images.folder.path(), &kit, &images.out()].map(|p| p.display().to_string());
+        let output = aogauge(&["score", &own, "--kit", &kit, "--out", &out, "--renderer", "mine"]);
+        (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap())
+    };
+    let edit = |file: &str, from: &str, to: &str| {
+        let text = fs::read_to_string(kit.join(file)).unwrap();
+        assert!(text.contains(from), "{file} lacks {from}");
+        fs::write(kit.join(file), text.replacen(from, to, 1)).unwrap();
+    };
+    fresh();
+    assert_eq!(score().0, 0);
+    // Gates may be edited.
+    edit("suite.toml", "max = 50.0", "max = 49.0");
+    assert_eq!(score().0, 0);
+    for file in [
+        "scoring.json",
+        "suite.toml",
+        "self-check.exr",
+        "corner/regions.exr",
+        "corner/converged-classic.exr",
+        "curtain-arcade/judge.exr",
+        "corner/look.exr",
+    ] {
+        for is_there in [true, false] {
+            fresh();
+            if is_there {
+                let mut bytes = fs::read(kit.join(file)).unwrap();
+                let at = bytes.len() / 2;
+                bytes[at] ^= 1;
+                fs::write(kit.join(file), bytes).unwrap();
+            } else {
+                fs::remove_file(kit.join(file)).unwrap();
+            }
+            let (code, text) = score();
+            let name = file.rsplit('/').next().unwrap();
+            assert!(code == 2 && text.contains(name), "{file}, {is_there}: {code}: {text}");
+        }
+    }
+    for (file, from, to) in [
+        ("suite.toml", "precision = 0.3", "precision = 0.4"),
+        ("suite.toml", "receiver_plane = \"clipped\"", "receiver_plane = \"counts\""),
+        ("scoring.json", "\"seed\": ", "\"seed\": 1"),
+        ("scoring.json", "\"control\": true", "\"control\": false"),
+        ("scoring.json", "\"radius\": ", "\"radius\": 1"),
+    ] {
+        fresh();
+        edit(file, from, to);
+        let (code, text) = score();
+        assert!(code == 2 && text.contains(file), "{file}: {code}: {text}");
+    }
+}
+
+fn copy_all(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap().map(|e| e.unwrap().path()) {
+        let beside = to.join(entry.file_name().unwrap());
+        if entry.is_dir() {
+            copy_all(&entry, &beside);
+        } else {
+            fs::copy(&entry, &beside).unwrap();
+        }
+    }
+}
+
+/// A gate that no scene of the kit could ever be held against is a mistake.
+#[test]
+fn gates_that_can_never_apply_are_named() {
+    let images = Images::new();
+    images.all(|_, image, _| image.to_vec());
+    let gates = images.out().with_extension("toml");
+    for (gate, says) in [
+        (
+            "metric = 'contrast-error'\nscenes = ['corner']",
+            "gate 'mine': contrast-error is taken under an occluder, and none of its scenes has one: corner",
+        ),
+        ("metric = 'bias'\nregion = 'footprint'\nscenes = ['corner']", "bias of footprint is taken under an occluder"),
+        ("metric = 'judge-contrast'\nscenes = ['corner']", "judge-contrast is taken under an occluder"),
+    ] {
+        fs::write(&gates, format!("[[gate]]\nname = 'mine'\nmax = 5.0\n{gate}\n")).unwrap();
+        let (code, text) = images.score(&["--gates", gates.to_str().unwrap()]);
+        assert!(code == 2 && text.contains(says) && text.contains(".toml"), "{code}: {text}");
+    }
+    fs::remove_file(gates).unwrap();
+}
+
+/// What is the same of many files is said once.
+#[test]
+fn warnings_of_many_files_are_one_line() {
+    let images = Images::new();
+    for scene in ["curtain-arcade", "corner"] {
+        let (replicates, [w, h]) = Images::of(scene, "classic");
+        for (r, image) in replicates.iter().enumerate() {
+            let at = |x: u32, y: u32| image::Luma([(image[(y * w + x) as usize] * 255.0).round() as u8]);
+            let path = images.folder.path().join(format!("{scene}.classic.4.{r:04}.png"));
+            image::ImageBuffer::from_fn(w, h, at).save(path).unwrap();
+        }
+    }
+    let (_, text) = images.score(&[]);
+    let lines: Vec<&str> = text.lines().filter(|l| l.contains("no encoding is declared")).collect();
+    assert!(lines.len() <= 2 && lines[0].contains("(all 4 files)") && lines[0].ends_with("(all 2 cases)"), "{text}");
+}
+
+/// Notes stand on lines of their own.
+#[test]
+fn what_is_not_taken_is_a_line_each() {
+    let (replicates, size) = Images::of("corner", "classic");
+    let none = Images::new();
+    none.exr("corner.clasic.4.0000.exr", &replicates[0], size);
+    none.exr("room.classic.4.0000.exr", &replicates[0], size);
+    let (code, text) = none.score(&[]);
+    let lines: Vec<&str> = text.lines().collect();
+    assert!(code == 4 && lines.len() == 3 && lines[1..].iter().all(|l| l.starts_with("  ")), "{code}: {text}");
+    // What a folder is called that no renderer may be.
+    let odd = tempfile::Builder::new().prefix("my_ao no 1").tempdir().unwrap();
+    Layers::new(size).with("Y", replicates[0].clone()).write(&odd.path().join("corner.classic.4.exr")).unwrap();
+    let [kit, folder, out] = [&world().join("kit"), odd.path(), &none.out()].map(|p| p.display().to_string());
+    let output = aogauge(&["score", &folder, "--kit", &kit, "--out", &out, "--partial"]);
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert!(text.contains("The renderer is called 'my_ao-no-1"), "{text}");
+}
+
+/// How many images there are is said where it matters.
+#[test]
+fn counts_of_images_are_told() {
+    let fewer = Images::new();
+    fewer.all(|_, image, _| image.to_vec());
+    for scene in ["curtain-arcade", "corner"] {
+        for r in [2, 3] {
+            fs::remove_file(fewer.folder.path().join(format!("{scene}.classic.4.{r:04}.exr"))).unwrap();
+        }
+    }
+    fewer.score(&[]);
+    let record = fewer.record();
+    let removed = case(&record, "curtain-arcade", "extended").metric(MetricName::Removed, None).unwrap();
+    let note = removed.note.clone().unwrap();
+    assert!(note.contains("there are 4 images of this case and 2 images of classic AO ('classic')"), "{note}");
+    // One image cannot show that seeds differ.
+    let (replicates, size) = Images::of("curtain-arcade", "classic");
+    let one = Images::new();
+    one.exr("curtain-arcade.classic.4.exr", &replicates[0], size);
+    let gates = one.out().with_extension("toml");
+    fs::write(&gates, "[[gate]]\nname = 'seeds'\nmetric = 'distinct-replicates'\nmin = 1.0\n").unwrap();
+    let (code, text) = one.score(&["--partial", "--gates", gates.to_str().unwrap()]);
+    assert!(code == 6 && text.contains("one image alone"), "{code}: {text}");
+    fs::remove_file(gates).unwrap();
+    for (curve, says) in
+        [("-1,1", "curve.gain is -1: it must be 0.000001 to 1000"), ("1", "give fit, or gain (0.000001 to 1000)")]
+    {
+        let (code, text) = one.score(&["--partial", "--curve", curve]);
+        assert!(code == 2 && text.contains(says), "{code}: {text}");
+    }
 }

@@ -25,7 +25,12 @@ const GAINED: f64 = 1.15;
 const SURE: f64 = 4.0;
 /// sRGB is near the power 1/2.2; powers in this range are an encoding for display.
 const DISPLAY: [f64; 2] = [1.0 / 2.7, 1.0 / 1.7];
+/// The reference must deviate by so much that a strength, one free number, can be told.
+const BLENDED: f64 = 0.05;
+/// Strengths of AO that are looked for.
+const STRENGTHS: std::ops::Range<f64> = 0.05..4.0;
 
+#[derive(Clone)]
 struct Hypothesis {
     finding: Finding,
     /// Mean square of what it leaves, and its error.
@@ -35,28 +40,77 @@ struct Hypothesis {
 /// What explains how an image differs from the reference, if anything does.
 pub(super) fn find(image: &[f32], reference: &Reference, width: usize) -> Option<Finding> {
     let without = left(image, &reference.openness, width);
-    if without[0] < DIFFERENT * DIFFERENT + SURE * without[1] {
+    if !is_different(without) {
         return None;
     }
     let hypotheses = values(image, reference, width).into_iter().chain(scales(image, reference, width));
-    let explains = |h: &Hypothesis| {
-        let error = without[1].hypot(h.left[1]);
-        let is_left = h.left[0] < LEFT * without[0] + 2.0 * h.left[1];
-        is_left && h.left[0] + 2.0 * h.left[1] < CERTAIN * without[0] && without[0] - h.left[0] > SURE * error
-    };
-    let best = hypotheses.filter(explains).reduce(|a, b| if b.left[0] < a.left[0] { b } else { a })?;
+    let blended = strength(image, reference, width).filter(|h| explains(h.left, without));
+    let hypotheses = hypotheses.filter(|h| explains(h.left, without)).chain(blended.clone());
+    let best = hypotheses.reduce(|a, b| if b.left[0] < a.left[0] { b } else { a })?;
+    // One free number that does nearly as well as two is rather it.
+    if let (Finding::Curve { .. }, Some(blended)) = (&best.finding, &blended)
+        && blended.left[0] - best.left[0] < 2.0 * blended.left[1].hypot(best.left[1])
+    {
+        return Some(blended.finding.clone());
+    }
     Some(match best.finding {
         Finding::Scaled { factors } => same_scales(image, reference, width, &factors),
+        Finding::Encoded { gamma, .. } => {
+            let alike = |h: &Hypothesis| h.left[0] - best.left[0] < SURE * h.left[1].hypot(best.left[1]);
+            let strength = blended.filter(alike).and_then(|h| match h.finding {
+                Finding::Strength { strength } => Some(strength),
+                _ => None,
+            });
+            Finding::Encoded { gamma, strength }
+        }
         other => other,
     })
+}
+
+/// Whether what a hypothesis leaves of a difference explains it: mean squares with their errors.
+pub(super) fn explains(left: [f64; 2], without: [f64; 2]) -> bool {
+    let error = without[1].hypot(left[1]);
+    let is_left = left[0] < LEFT * without[0] + 2.0 * left[1];
+    is_left && left[0] + 2.0 * left[1] < CERTAIN * without[0] && without[0] - left[0] > SURE * error
+}
+
+/// Whether a difference, a mean square with its error, is worth an explanation.
+pub(super) fn is_different(without: [f64; 2]) -> bool {
+    without[0] >= DIFFERENT * DIFFERENT + SURE * without[1]
+}
+
+/// Whether another scene's picture explains how an image differs from the reference.
+pub(super) fn is_rather(image: &[f32], reference: &[f32], other: &[f32], width: usize) -> bool {
+    let without = left(image, reference, width);
+    is_different(without) && explains(left(image, other, width), without)
+}
+
+/// AO that was blended with white: occlusion times a factor, by least squares.
+fn strength(image: &[f32], reference: &Reference, width: usize) -> Option<Hypothesis> {
+    let reference = &reference.openness;
+    if Samples::new(image, reference).deviation() < BLENDED {
+        return None;
+    }
+    let pairs = image.iter().zip(reference).map(|(a, b)| [1.0 - f64::from(*a), 1.0 - f64::from(*b)]);
+    let known = pairs.filter(|p| p.iter().all(|v| v.is_finite()));
+    let (both, own) = known.fold((0.0, 0.0), |(both, own), [a, b]| (both + a * b, own + b * b));
+    let strength = both / own;
+    if !STRENGTHS.contains(&strength) || strength.max(1.0 / strength) < GAINED {
+        return None;
+    }
+    let plain: Vec<f32> = image.iter().map(|v| 1.0 - (1.0 - v) / strength as f32).collect();
+    Some(Hypothesis { finding: Finding::Strength { strength }, left: left(&plain, reference, width) })
 }
 
 /// The image as it would be without what was found.
 pub(super) fn undone(finding: &Finding, image: &[f32]) -> Option<Vec<f32>> {
     let curve = match *finding {
-        Finding::Encoded { gamma: None } => return Some(image.iter().map(|v| linear(*v)).collect()),
-        Finding::Encoded { gamma: Some(gamma) } => Curve { exponent: 1.0 / gamma, ..Curve::IDENTITY },
+        Finding::Encoded { gamma: None, .. } => return Some(image.iter().map(|v| linear(*v)).collect()),
+        Finding::Encoded { gamma: Some(gamma), .. } => Curve { exponent: 1.0 / gamma, ..Curve::IDENTITY },
         Finding::Curve { gain, exponent } => Curve { gain, exponent, ..Curve::IDENTITY },
+        Finding::Strength { strength } => {
+            return Some(image.iter().map(|v| 1.0 - (1.0 - v) / strength as f32).collect());
+        }
         _ => return None,
     };
     Some(curve.undo(image))
@@ -70,7 +124,7 @@ pub(super) fn left(image: &[f32], reference: &[f32], width: usize) -> [f64; 2] {
 /// The image as codes, and through a curve. Codes come first: they have no free number.
 fn values(image: &[f32], reference: &Reference, width: usize) -> Vec<Hypothesis> {
     let left_by = |finding: &Finding| undone(finding, image).map(|u| left(&u, &reference.openness, width));
-    let srgb = Finding::Encoded { gamma: None };
+    let srgb = Finding::Encoded { gamma: None, strength: None };
     let mut found = Vec::new();
     if let Some(left) = left_by(&srgb) {
         found.push(Hypothesis { finding: srgb, left });
@@ -85,8 +139,11 @@ fn values(image: &[f32], reference: &Reference, width: usize) -> Vec<Hypothesis>
         return found;
     }
     let is_display = (DISPLAY[0]..DISPLAY[1]).contains(&exponent) && (0.95..1.05).contains(&gain);
-    let finding =
-        if is_display { Finding::Encoded { gamma: Some(1.0 / exponent) } } else { Finding::Curve { gain, exponent } };
+    let finding = if is_display {
+        Finding::Encoded { gamma: Some(1.0 / exponent), strength: None }
+    } else {
+        Finding::Curve { gain, exponent }
+    };
     let Some(left) = left_by(&finding) else { return found };
     // What the sRGB curve explains nearly as well is that.
     let is_srgb = is_display && found.iter().any(|h| h.left[0] < 2.0 * left[0] + 1e-5 + SURE * left[1]);

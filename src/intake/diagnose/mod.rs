@@ -1,12 +1,13 @@
 //! What is wrong with an image, told by comparing it with a reference under each hypothesis.
 //!
-//! Three questions in this order, each with what the one before it found undone:
-//! how the image lies ([`place`]), what its numbers mean ([`meaning`]), and by how much it
-//! is shifted ([`shift`]). Margins are stated where they are used; all of them are measured
+//! Four questions in this order, each with what the one before it found undone: whether its
+//! numbers are in range ([`range`]), how the image lies ([`place`]), what its numbers mean
+//! ([`meaning`]), and by how much it is shifted ([`shift`]). Margins are stated where they are used; all of them are measured
 //! against images of 4 rays and of 1 ray, and of other estimators.
 
 mod meaning;
 mod place;
+mod range;
 mod samples;
 mod shift;
 #[cfg(test)]
@@ -15,7 +16,7 @@ mod tests;
 pub use place::{Turn, alike};
 
 use samples::Samples;
-use std::fmt;
+use std::{borrow::Cow, fmt};
 
 /// What an image is held against.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -55,8 +56,30 @@ pub enum Finding {
     Holes {
         /// How many.
         count: usize,
+        /// How many of them are infinite, and not NaN.
+        infinite: usize,
         /// Column and row of the first.
         first: [usize; 2],
+    },
+    /// Its values are of another scale than 0 to 1.
+    Range {
+        /// The least of them, as they were stored.
+        least: f32,
+        /// The greatest.
+        most: f32,
+        /// What they must be divided by; None where no usual scale explains them.
+        scale: Option<f64>,
+    },
+    /// Openness below 0.
+    Negative {
+        /// Pixels.
+        count: usize,
+        /// The least value.
+        least: f32,
+        /// Whether openness runs from -1 to 1.
+        is_signed: bool,
+        /// Whether so few pixels are that a filter may have left them.
+        is_doubt: bool,
     },
     /// It is the same everywhere, where the scene is not; nothing else is told.
     Constant {
@@ -71,6 +94,13 @@ pub enum Finding {
     Encoded {
         /// None: the sRGB curve.
         gamma: Option<f64>,
+        /// What [`Finding::Strength`] would explain it as well, where the scene cannot tell them apart.
+        strength: Option<f64>,
+    },
+    /// AO was blended with white: 1 - `strength` * (1 - openness).
+    Strength {
+        /// 1 is as it should be.
+        strength: f64,
     },
     /// It was sent through a curve, gain * openness ^ exponent.
     Curve {
@@ -118,24 +148,46 @@ pub fn diagnose(image: &[f32], reference: &Reference, size: [usize; 2]) -> Vec<F
         findings.push(Finding::Constant { value });
         return findings;
     }
-    let placed = place::find(image, reference, size);
+    let ranged = range::find(image, &reference.openness, size[0]);
+    let (ranged, image) = ranged.map_or((None, Cow::Borrowed(image)), |(f, i)| (Some(f), Cow::Owned(i)));
+    findings.extend(ranged);
+    let placed = place::find(&image, reference, size);
     if placed.correlation < place::LEAST {
-        findings.push(Finding::Unlike { correlation: placed.correlation });
+        let shifted = shift::far(&image, &reference.openness, size).map(|pixels| Finding::Shifted { pixels });
+        findings.push(shifted.unwrap_or(Finding::Unlike { correlation: placed.correlation }));
         return findings;
     }
     findings.extend((placed.turn != Turn::None).then_some(Finding::Turned(placed.turn)));
     findings.extend(placed.inverted.then_some(Finding::Inverted));
-    let upright = placed.undone(image, size);
+    let upright = placed.undone(&image, size);
     let meaning = meaning::find(&upright, reference, size[0]);
     let factor = match &meaning {
         Some(Finding::Scaled { factors }) => factors.first().copied(),
         _ => None,
     };
     let plain = meaning.as_ref().and_then(|m| meaning::undone(m, &upright)).unwrap_or(upright);
+    let is_explained = meaning.is_some();
     findings.extend(meaning);
     let like = reference.scaled.iter().find(|s| Some(s.factor) == factor).map_or(&reference.openness, |s| &s.openness);
-    findings.extend(shift::find(&plain, like, size).map(|pixels| Finding::Shifted { pixels }));
+    let shifted = shift::find(&plain, like, size);
+    let far = || if is_explained { None } else { shift::far(&plain, like, size) };
+    findings.extend(shifted.or_else(far).map(|pixels| Finding::Shifted { pixels }));
     findings
+}
+
+/// Whether an image that is not like its reference is like `other`, that of another scene: the
+/// difference from it is a fraction of that from its own, by the noise.
+pub fn is_rather(image: &[f32], reference: &[f32], other: &[f32], width: usize) -> bool {
+    image.len() == reference.len() && image.len() == other.len() && meaning::is_rather(image, reference, other, width)
+}
+
+/// How a whole frame lies beside what it may show: openness, or light, by which of them tells it
+/// best. Only what is plain is told: much of a frame is neither.
+///
+/// None where it lies as it should, or cannot be told.
+pub fn frame_turn(light: &[f32], like: &[&[f32]], size: [usize; 2]) -> Option<Turn> {
+    let fits = size[0].checked_mul(size[1]) == Some(light.len());
+    if fits { place::turn_of_frame(light, like, size) } else { None }
 }
 
 /// How far an image is from the reference, mean square without its noise, however it lies.
@@ -154,7 +206,11 @@ pub(super) fn faults_aside(image: &[f32], reference: &Reference, size: [usize; 2
 fn holes(image: &[f32], reference: &[f32], width: usize) -> Option<Finding> {
     let mut holes = (0..image.len()).filter(|&i| reference[i].is_finite() && !image[i].is_finite());
     let first = holes.next()?;
-    Some(Finding::Holes { count: 1 + holes.count(), first: [first % width, first / width] })
+    let (mut count, mut infinite) = (1, usize::from(image[first].is_infinite()));
+    for i in holes {
+        (count, infinite) = (count + 1, infinite + usize::from(image[i].is_infinite()));
+    }
+    Some(Finding::Holes { count, infinite, first: [first % width, first / width] })
 }
 
 impl Finding {
@@ -162,14 +218,35 @@ impl Finding {
     pub fn title(&self) -> String {
         match self {
             Finding::Size { found, expected } => format!("wrong size: {found} pixels, not {expected}"),
-            Finding::Holes { count, first: [x, y] } => {
-                format!("NaN: {count} pixels that see a surface hold no number, the first at column {x}, row {y}")
+            Finding::Holes { count, infinite, first: [x, y] } => {
+                let what = match *infinite {
+                    0 => "NaN",
+                    n if n == *count => "infinity",
+                    _ => "NaN and infinity",
+                };
+                format!("{what}: {count} pixels that see a surface hold no number, the first at column {x}, row {y}")
+            }
+            Finding::Range { least, most, .. } => {
+                format!("out of range: values run from {least:.3} to {most:.3}, where openness is 0 to 1")
+            }
+            Finding::Negative { count, least, is_signed, .. } => {
+                let signed = if *is_signed { ", as if it ran from -1 to 1" } else { "" };
+                format!("negative openness: {count} pixels are below 0, the least is {least:.3}{signed}")
             }
             Finding::Constant { value } => format!("constant: {value} everywhere"),
             Finding::Turned(turn) => turn.title().to_owned(),
             Finding::Inverted => "inverted: 1 is closed".to_owned(),
-            Finding::Encoded { gamma: None } => "gamma-encoded: sRGB codes, not linear".to_owned(),
-            Finding::Encoded { gamma: Some(gamma) } => format!("gamma-encoded: openness to the power 1/{gamma:.1}"),
+            Finding::Encoded { gamma, strength } => {
+                let how =
+                    gamma.map_or("sRGB codes, not linear".to_owned(), |g| format!("openness to the power 1/{g:.1}"));
+                let or = strength.map_or(String::new(), |s| {
+                    format!(" (or AO of strength {s:.2}, which this scene cannot tell from it)")
+                });
+                format!("gamma-encoded: {how}{or}")
+            }
+            Finding::Strength { strength } => {
+                format!("AO of strength {strength:.2}: 1 - {strength:.2} times occlusion")
+            }
             Finding::Curve { gain, exponent } => {
                 format!("a curve: {gain:.2} times openness to the power {exponent:.2}")
             }
@@ -186,7 +263,12 @@ impl Finding {
 
     /// Whether the image may be measured all the same, since it may be meant to be so.
     pub fn is_doubt(&self) -> bool {
-        matches!(self, Finding::Curve { .. } | Finding::Shifted { .. })
+        match self {
+            Finding::Curve { .. } | Finding::Strength { .. } | Finding::Shifted { .. } => true,
+            Finding::Range { scale, .. } => scale.is_none(),
+            Finding::Negative { is_doubt, .. } => *is_doubt,
+            _ => false,
+        }
     }
 
     /// What to do about it.
@@ -194,13 +276,24 @@ impl Finding {
         match self {
             Finding::Size { .. } => "render as many pixels as the view has, or declare `resolution`".to_owned(),
             Finding::Holes { .. } => "look for a division by zero, or pixels that the AO pass leaves out".to_owned(),
+            Finding::Range { scale: Some(scale), .. } => format!("divide by {scale}"),
+            Finding::Range { scale: None, .. } => {
+                "save the AO buffer alone, before it meets light or exposure".to_owned()
+            }
+            Finding::Negative { is_signed: true, .. } => "save (v + 1) / 2".to_owned(),
+            Finding::Negative { .. } => {
+                "save openness itself: a filter that sharpens, or an intensity above 1, leaves such values".to_owned()
+            }
             Finding::Constant { .. } => "save the AO buffer itself: this one was cleared and not drawn".to_owned(),
             Finding::Turned(turn) => turn.remedy().to_owned(),
             Finding::Inverted => "declare `means = \"occlusion\"`, or save 1 - occlusion".to_owned(),
-            Finding::Encoded { gamma: None } => {
+            Finding::Strength { .. } => {
+                "set strength, intensity or opacity of the AO to 1, or save its buffer before it is blended".to_owned()
+            }
+            Finding::Encoded { gamma: None, .. } => {
                 "declare `encoding = \"srgb\"`, or save the buffer without a view transform".to_owned()
             }
-            Finding::Encoded { gamma: Some(gamma) } => format!(
+            Finding::Encoded { gamma: Some(gamma), .. } => format!(
                 "save the buffer without a view transform, or declare `curve = {{ gain = 1.0, exponent = {:.3} }}`",
                 1.0 / gamma
             ),

@@ -109,7 +109,8 @@ impl Turn {
         }
     }
 
-    pub(super) fn remedy(self) -> &'static str {
+    /// What to do about it.
+    pub fn remedy(self) -> &'static str {
         match self {
             Turn::None => "nothing",
             Turn::FlippedY => "declare `rows = \"bottom\"`, or save the rows from the top",
@@ -166,6 +167,23 @@ pub(super) fn find(image: &[f32], reference: &Reference, size: [usize; 2]) -> Pl
     let sure = samples.correlation().abs() * (samples.pairs() as f64).sqrt() > SURE;
     let inverted = sure && samples.correlation() < 0.0;
     Placed { turn, inverted, correlation: likeness(image, &samples, own.mean(), size[0]) }
+}
+
+/// The share of its variance that a frame which lies otherwise must have explained by a picture of
+/// the scene, and how many times the share without.
+const FRAME: f64 = 0.6;
+const FRAME_TIMES: f64 = 2.0;
+
+/// How a frame lies beside the best of several pictures, where that is plain.
+pub(super) fn turn_of_frame(light: &[f32], like: &[&[f32]], size: [usize; 2]) -> Option<Turn> {
+    let share = |turn: Turn| {
+        let upright = turn.undone(light, size);
+        let shares = like.iter().filter(|r| r.len() == light.len()).map(|r| Samples::new(&upright, r));
+        let shares = shares.filter(|s| s.deviation() >= VARIED * s.reference_mean().abs());
+        shares.map(|s| s.correlation().max(0.0).powi(2)).fold(0.0, f64::max)
+    };
+    let best = Turn::possible(size).iter().map(|&t| (t, share(t))).reduce(|a, b| if b.1 > a.1 { b } else { a })?;
+    (best.0 != Turn::None && best.1 > FRAME && best.1 > FRAME_TIMES * share(Turn::None)).then_some(best.0)
 }
 
 /// The correlation that an image would have without its noise, where that can be told.

@@ -63,6 +63,11 @@ impl Samples {
         self.moments[1].sqrt()
     }
 
+    /// Mean of the reference.
+    pub(super) fn reference_mean(&self) -> f64 {
+        self.means[1]
+    }
+
     /// Mean of the image.
     pub(super) fn mean(&self) -> f64 {
         self.means[0]

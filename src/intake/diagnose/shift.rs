@@ -1,6 +1,9 @@
 //! By how much an image lies beside its reference.
 
-use super::samples::Samples;
+use super::{
+    meaning::{explains, is_different, left},
+    samples::Samples,
+};
 
 /// Whole pixels that are tried each way.
 const REACH: isize = 3;
@@ -42,6 +45,26 @@ pub(super) fn find(image: &[f32], reference: &[f32], size: [usize; 2]) -> Option
         ((whole[axis] as f64 + part) * 2.0).round() / 2.0 + 0.0
     });
     (halves != [0.0, 0.0]).then_some(halves)
+}
+
+/// Whole pixels that a smooth picture is tried at each way.
+const FAR: isize = 8;
+
+/// The same for pictures without edges, in whole pixels: by how far the shifted reference explains
+/// what the image differs by. Only a shift that explains nearly all of it is told, so that
+/// another estimator is none; of those that do as well the smallest.
+pub(super) fn far(image: &[f32], reference: &[f32], size: [usize; 2]) -> Option<[f64; 2]> {
+    let without = left(image, reference, size[0]);
+    if !is_different(without) {
+        return None;
+    }
+    let all = (-FAR..=FAR).flat_map(|dy| (-FAR..=FAR).map(move |dx| [dx, dy])).filter(|by| *by != [0, 0]);
+    let tried: Vec<([isize; 2], [f64; 2])> =
+        all.map(|by| (by, left(image, &moved(reference, size, by), size[0]))).collect();
+    let least = tried.iter().map(|(_, left)| left[0]).fold(f64::INFINITY, f64::min);
+    let as_good = tried.into_iter().filter(|(_, left)| left[0] < least + 2.0 * left[1] + 0.01 * without[0]);
+    let (by, left) = as_good.min_by_key(|(by, _)| by[0] * by[0] + by[1] * by[1])?;
+    explains(left, without).then(|| by.map(|v| v as f64))
 }
 
 /// Root mean square difference of two pictures, where both hold numbers.

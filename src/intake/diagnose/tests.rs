@@ -156,12 +156,14 @@ fn codes_for_display_are_told() {
     for bench in [&*SELF, &Bench::library("corner")] {
         for rays in [64, 4] {
             let image: Vec<f32> = bench.classic(rays).into_iter().map(encode).collect();
-            assert_eq!(bench.diagnose(&image), [Finding::Encoded { gamma: None }], "{}, {rays}", bench.scene.name);
+            let found = bench.diagnose(&image);
+            let is = matches!(found[..], [Finding::Encoded { gamma: None, .. }]);
+            assert!(is, "{}, {rays} rays: {found:?}", bench.scene.name);
         }
     }
     let image: Vec<f32> = SELF.classic(16).iter().map(|v| v.powf(1.0 / 1.8)).collect();
     let found = SELF.diagnose(&image);
-    assert!(matches!(found[..], [Finding::Encoded { gamma: Some(g) }] if (g - 1.8).abs() < 0.1), "{found:?}");
+    assert!(matches!(found[..], [Finding::Encoded { gamma: Some(g), .. }] if (g - 1.8).abs() < 0.1), "{found:?}");
     assert_eq!(SELF.diagnose(&SELF.classic(1).into_iter().map(encode).collect::<Vec<_>>()), []);
 }
 
@@ -215,7 +217,7 @@ fn holes_constants_sizes_and_other_pictures_are_told() {
     for rays in NOISES {
         let mut image = SELF.classic(rays);
         (image[163], image[500]) = (f32::NAN, f32::NEG_INFINITY);
-        assert_eq!(SELF.diagnose(&image), [Finding::Holes { count: 2, first: [3, 1] }]);
+        assert_eq!(SELF.diagnose(&image), [Finding::Holes { count: 2, infinite: 1, first: [3, 1] }]);
         let noise = Bench::library("leaves").classic(rays);
         let other: Vec<f32> = (0..image.len()).map(|i| noise[i % noise.len()]).collect();
         let found = SELF.diagnose(&other);
@@ -226,7 +228,7 @@ fn holes_constants_sizes_and_other_pictures_are_told() {
         assert_eq!(SELF.diagnose(&vec![value; pixels]), [Finding::Constant { value }]);
     }
     let holes = vec![f32::NAN; pixels];
-    assert_eq!(SELF.diagnose(&holes), [Finding::Holes { count: pixels, first: [0, 0] }]);
+    assert_eq!(SELF.diagnose(&holes), [Finding::Holes { count: pixels, infinite: 0, first: [0, 0] }]);
     assert_eq!(SELF.diagnose(&holes[1..]), [Finding::Size { found: pixels - 1, expected: pixels }]);
     assert_eq!(diagnose(&[], &Reference::default(), [0, 0]), [Finding::Size { found: 0, expected: 0 }]);
     let odd = Reference { scaled: vec![Scaled { factor: 2.0, openness: vec![0.5] }], ..SELF.reference.clone() };
@@ -244,7 +246,7 @@ fn faults_are_told_together() {
     assert!(text.starts_with("flipped in y") && text.ends_with("save the rows from the top"), "{text}");
     let image: Vec<f32> = SELF.classic(16).into_iter().map(encode).collect();
     let found = SELF.diagnose(&Turn::FlippedX.of(&image, SELF.size));
-    assert_eq!(found, [Finding::Turned(Turn::FlippedX), Finding::Encoded { gamma: None }]);
+    assert_eq!(found, [Finding::Turned(Turn::FlippedX), Finding::Encoded { gamma: None, strength: None }]);
     let inches = Finding::Scaled { factors: vec![1.0 / 39.37] };
     assert!(inches.to_string().contains("R is 1/39.37 times") && inches.to_string().contains("by 39.37"), "{inches}");
 }
@@ -276,4 +278,123 @@ fn the_self_check_shows_what_it_must() {
     let gbuffer = GBuffer::new(&SELF.geometry.tracer, &SELF.scene.measure.view());
     let regions = Regions::new(&SELF.scene, &SELF.geometry.tracer, &gbuffer);
     assert!(regions.pixels(crate::metrics::regions::Region::Footprint).is_empty());
+}
+
+#[test]
+fn other_scales_and_values_below_zero_are_told() {
+    for bench in [&*SELF, &Bench::library("corner"), &Bench::library("curtain-arcade")] {
+        for rays in NOISES {
+            let plain = bench.classic(rays);
+            for scale in [100.0, 255.0, 65_535.0] {
+                let told = |image: &[f32], size, also: &[Finding]| {
+                    let found = diagnose(image, &bench.reference, size);
+                    let is = matches!(found[0], Finding::Range { scale: Some(s), .. } if s == f64::from(scale));
+                    assert!(is && found[1..] == *also, "{scale}, {rays} rays, {}: {found:?}", bench.scene.name);
+                };
+                let times = |image: &[f32]| image.iter().map(|v| v * scale).collect::<Vec<f32>>();
+                told(&times(&plain), bench.size, &[]);
+                let inverted: Vec<f32> = plain.iter().map(|v| 1.0 - v).collect();
+                told(&times(&inverted), bench.size, &[Finding::Inverted]);
+                // As it is read where it was declared to be occlusion.
+                told(&times(&inverted).iter().map(|v| 1.0 - v).collect::<Vec<_>>(), bench.size, &[]);
+            }
+            let signed: Vec<f32> = plain.iter().map(|v| 2.0 * v - 1.0).collect();
+            let found = bench.diagnose(&signed);
+            // Where openness is above a half everywhere there is nothing below 0.
+            let is_open = bench.scene.name != "self-check";
+            let is = matches!(found[..], [Finding::Negative { is_signed: true, .. }]);
+            assert!(is || is_open, "{rays} rays, {}: {found:?}", bench.scene.name);
+        }
+    }
+    let text = SELF.diagnose(&SELF.classic(64).iter().map(|v| v * 255.0).collect::<Vec<_>>())[0].to_string();
+    assert!(text.starts_with("out of range: values run from 3.98"), "{text}");
+    assert!(text.ends_with("divide by 255"), "{text}");
+    // Light is no openness of another scale.
+    let light: Vec<f32> = SELF.classic(64).iter().enumerate().map(|(i, v)| v * (1 + i % 7) as f32).collect();
+    let found = SELF.diagnose(&light);
+    assert!(matches!(found[0], Finding::Range { scale: None, .. }), "{found:?}");
+    let text = Finding::Negative { count: 9, least: -0.2, is_signed: false, is_doubt: true }.to_string();
+    assert!(text.starts_with("negative openness: 9 pixels are below 0, the least is -0.200;"), "{text}");
+}
+
+/// Blended with white it is not gamma, as near as half of it comes to the sRGB curve.
+#[test]
+fn strength_is_told_from_codes() {
+    for bench in [&*SELF, &Bench::library("corner"), &Bench::library("crevice")] {
+        for rays in [64, 4] {
+            for strength in [0.5, 0.7, 1.4] {
+                let image: Vec<f32> = bench.classic(rays).iter().map(|v| 1.0 - strength * (1.0 - v)).collect();
+                let found = bench.diagnose(&image);
+                let near = |s: &f64| (s / f64::from(strength) - 1.0).abs() < 0.03;
+                let is = |f: &Finding| match f {
+                    Finding::Strength { strength } => near(strength),
+                    // In the corner openness is 0.5 to 1, where the two are nearly the same, as they are in noise.
+                    Finding::Encoded { strength: Some(s), .. } => {
+                        (bench.scene.name == "corner" || rays == 4) && near(s)
+                    }
+                    _ => false,
+                };
+                // Above 1 it leaves values below 0, too.
+                let told = found.iter().filter(|f| !matches!(f, Finding::Negative { .. })).collect::<Vec<_>>();
+                assert!(told.len() == 1 && is(told[0]), "{strength}, {rays} rays, {}: {found:?}", bench.scene.name);
+            }
+        }
+    }
+}
+
+/// Where there is no edge, a shift is told by what it explains.
+#[test]
+fn shifts_of_smooth_pictures_are_told() {
+    for name in ["crevice", "corner"] {
+        let bench = Bench::library(name);
+        let image = bench.classic(256);
+        let [width, _] = bench.size;
+        for by in [4isize, -6] {
+            let at = |i: usize| {
+                let x = (i % width) as isize - by;
+                image[i - i % width + x.clamp(0, width as isize - 1) as usize]
+            };
+            let moved: Vec<f32> = (0..image.len()).map(at).collect();
+            let found = bench.diagnose(&moved);
+            let is =
+                matches!(found[..], [Finding::Shifted { pixels: [x, y] }] if (x - by as f64).abs() <= 1.0 && y == 0.0);
+            assert!(is, "{name} by {by}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn another_scene_of_the_kit_is_told() {
+    let [corner, crevice] = ["corner", "crevice"].map(Bench::library);
+    for rays in NOISES {
+        let image = corner.classic(rays);
+        let [own, other] = [&corner, &crevice].map(|b| b.reference.openness.as_slice());
+        if own.len() == other.len() {
+            assert!(is_rather(&image, other, own, corner.size[0]), "{rays} rays");
+            assert!(!is_rather(&image, own, other, corner.size[0]), "{rays} rays");
+        }
+        let open = vec![1.0; own.len()];
+        assert!(is_rather(&image, &open, own, corner.size[0]) && is_rather(&open, own, &open, corner.size[0]));
+        for (name, estimator) in estimators() {
+            let image = corner.render(estimator, 1.0, rays, [0.0; 2]);
+            assert!(!is_rather(&image, own, &open, corner.size[0]), "{name}, {rays} rays");
+        }
+    }
+}
+
+#[test]
+fn how_a_frame_lies_is_told_where_it_is_plain() {
+    for rays in NOISES {
+        let light: Vec<f32> = SELF.classic(rays).iter().map(|v| 3.0 * v + 0.4).collect();
+        let reference: &[f32] = &SELF.reference.openness;
+        assert_eq!(frame_turn(&light, &[reference], SELF.size), None);
+        let turned = Turn::FlippedY.of(&light, SELF.size);
+        let found = frame_turn(&turned, &[reference], SELF.size);
+        // Of one ray most of the variance is noise.
+        assert_eq!(found, (rays > 1).then_some(Turn::FlippedY), "{rays} rays");
+        assert_eq!(frame_turn(&light, &[], SELF.size), None);
+        assert_eq!(frame_turn(&light[1..], &[reference], SELF.size), None);
+    }
+    let lamp: Vec<f32> = (0..SELF.reference.openness.len()).map(|i| (i % 160) as f32).collect();
+    assert_eq!(frame_turn(&lamp, &[&SELF.reference.openness], SELF.size), None);
 }

@@ -52,6 +52,7 @@ fn page(folder: &Path, record: &Record) -> Result<String, ReportError> {
     let page = Page {
         title: record.suite.name.clone(),
         outcome: rows::overall(record),
+        label: record.handed_in.as_ref().map(|by| format!("images of {}, handed in", by.renderer)),
         summary: format!("{} in {} cases. {}", record.summary_line(), record.summary.cases, record.suite.description),
         notes: rows::notes(record),
         gates: rows::gates(record),

@@ -45,6 +45,11 @@ function badge(outcome) {
   return el("span", { class: `badge ${outcome}` }, OUTCOMES[outcome] ?? outcome);
 }
 
+/** Says that images are not our own. */
+function origin(text) {
+  return el("span", { class: "origin" }, text);
+}
+
 /** A number with as many digits as are worth reading. */
 function number(value) {
   if (value === undefined || Number.isNaN(value)) return "none";

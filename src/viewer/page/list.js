@@ -45,7 +45,7 @@ function row(item, chosen) {
     el(
       "button",
       { type: "button", class: "row", "aria-current": chosen ? "true" : null, click: () => choose(item, true) },
-      el("span", { class: "row-head" }, badge(item.outcome), el("span", { class: "small" }, item.rays ? `${item.renderer}, ${item.rays} rays` : item.renderer)),
+      el("span", { class: "row-head" }, badge(item.outcome), ...(item.origin ? [origin(item.origin)] : []), el("span", { class: "small" }, item.rays ? `${item.renderer}, ${item.rays} rays` : item.renderer)),
       el("span", { class: "row-name" }, el("b", {}, item.scene), ` ${item.estimator}`),
       thumbnails,
     ),

@@ -19,7 +19,7 @@ function showTab(id) {
 
 function fillHeader() {
   byId("title").textContent = data.title;
-  byId("verdict").replaceChildren(badge(data.outcome));
+  byId("verdict").replaceChildren(badge(data.outcome), ...(data.label ? [origin(data.label)] : []));
   byId("summary").textContent = data.summary;
   byId("notes").replaceChildren(...data.notes.map((n) => el("li", {}, n)));
   byId("tabs").replaceChildren(...TABS.map(([id, label]) => el("button", { type: "button", role: "tab", id: `to-${id}`, "aria-controls": `tab-${id}`, click: () => showTab(id) }, label)));
