@@ -108,8 +108,17 @@ class Value:
         self.half = self.se * t95(metric.get("df"))
 
     def __str__(self):
-        digits = 4 if self.half < 0.002 else 3 if self.half < 0.02 else 2
-        return f"{self.value:.{digits}f} ± {max(self.half, 10.0**-digits):.{digits}f}".replace("-", "−")
+        return written(self.value, self.half)
+
+
+def written(value, half):
+    digits = 4 if half < 0.002 else 3 if half < 0.02 else 2
+    text = f"{value:.{digits}f}"
+    return f"{text.removeprefix('-') if not float(text) else text} ± {max(half, 10.0**-digits):.{digits}f}".replace("-", "−")
+
+
+def between(interval):
+    return "–" if interval is None else written(sum(interval) / 2, (interval[1] - interval[0]) / 2)
 
 
 def case(record, scene, estimator, name, region=None, renderer="cpu"):
@@ -230,13 +239,9 @@ def fig5():
             folder = work / "paper/pictures" / scene
             path = folder / "path-traced.png" if method == "path-traced" else folder / "look" / f"{method}.png"
             axis.imshow(plt.imread(path), interpolation="nearest", cmap="gray", vmin=0, vmax=1)
-            axis.set_xticks([])
-            axis.set_yticks([])
-            axis.grid(False)
+            plain(axis, "#cccccc", 1)
             if scene == scenes[0]:
                 axis.set_title(title, fontsize=12)
-            for side in axis.spines.values():
-                side.set_visible(False)
         row[0].set_ylabel(scene.removeprefix("curtain-"), fontsize=12)
     save(figure, "fig-5-engines.png")
 
@@ -251,7 +256,7 @@ def fig6():
         axis.set_title(f"{scene}\nK(Q) = {judge(paper, scene)}", fontsize=10.5)
         axis.set_xlabel("t / R")
         axis.set_xlim(-1, 1)
-        axis.set_ylim(0, 1.15)
+        axis.set_ylim(0, 1.3)
     axes[0].set_ylabel("openness O, occlusion ratio Q")
     handles = [Line2D([], [], color=c, lw=2, label=n) for c, n in ((BLACK, "Q, path traced"), (RED, "classic"), (BLUE, "the paper, 32 rays"))]
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
@@ -265,38 +270,38 @@ def has(record, scene):
 
 # Fig. 8a
 
-# What is magnified, in parts of the picture's width and height: left, top, width, height, on each half.
-INSETS = {"curtain-arcade": [(0.20, 0.62, 0.16, 0.16), (0.62, 0.44, 0.16, 0.16)], "pillar": [(0.34, 0.40, 0.14, 0.2), (0.52, 0.40, 0.14, 0.2)]}
+# What is magnified of both, in parts of the picture's width and height: left, top, width, height.
+INSETS = {"curtain-arcade": (0.36, 0.46, 0.20, 0.24), "pillar": (0.36, 0.40, 0.20, 0.24)}
 
 
 def fig8a():
-    figure, axes = plt.subplots(1, 2, figsize=(14.5, 5.0))
-    for axis, scene in zip(axes, INSETS):
-        classic, extended = (plt.imread(work / f"look-{scene}-{m}.png") for m in ("classic", "extended"))
-        classic, extended = (i if i.ndim == 2 else i[..., 0] for i in (classic, extended))
+    figure, axes = plt.subplots(1, 2, figsize=(14.5, 5.2))
+    for axis, (scene, (left, top, w, h)) in zip(axes, INSETS.items()):
+        images = [plt.imread(work / f"look-{scene}-{m}.png") for m in METHODS]
+        classic, extended = (i if i.ndim == 2 else i[..., 0] for i in images)
         height, width = classic.shape
         both = np.hstack([classic[:, : width // 2], extended[:, width // 2 :]])
         axis.imshow(both, cmap="gray", vmin=0, vmax=1, interpolation="antialiased")
-        axis.axvline(width / 2, color="white", lw=2)
-        for (image, colour, (left, top, w, h)), corner in zip(
-            zip((classic, extended), (RED, BLUE), INSETS[scene]), ((0.01, 0.02), (0.77, 0.02))
-        ):
-            x, y, w, h = (round(v) for v in (left * width, top * height, w * width, h * height))
-            axis.add_patch(Rectangle((x, y), w, h, fill=False, color=colour, lw=1.6))
-            inset = axis.inset_axes([corner[0], 1 - corner[1] - 0.36, 0.22, 0.36])
-            inset.imshow(image[y : y + h, x : x + w], cmap="gray", vmin=0, vmax=1, interpolation="nearest", aspect="auto")
-            inset.set_xticks([])
-            inset.set_yticks([])
-            inset.grid(False)
-            for side in inset.spines.values():
-                side.set_visible(True)
-                side.set_color(colour)
-                side.set_linewidth(2)
-        axis.set_title(f"{scene}: classic | extended, 32 rays", fontsize=12)
-        axis.set_xticks([])
-        axis.set_yticks([])
-        axis.grid(False)
+        axis.axvline(width / 2, color=GREY, lw=1)
+        x, y, w, h = (round(v) for v in (left * width, top * height, w * width, h * height))
+        axis.add_patch(Rectangle((x, y), w, h, fill=False, color=BLACK, lw=1))
+        for image, colour, name, at in ((classic, RED, "classic", 0.015), (extended, BLUE, "extended", 0.685)):
+            inset = axis.inset_axes([at, 0.58, 0.3, 0.36])
+            inset.imshow(image[y : y + h, x : x + w], cmap="gray", vmin=0.5, vmax=1, interpolation="nearest", aspect="auto")
+            plain(inset, colour, 2)
+            inset.text(0.03, 0.05, name, transform=inset.transAxes, color=colour, fontsize=12, weight="bold")
+        axis.set_title(f"{scene}: left classic, right extended", fontsize=12)
+        plain(axis, "#cccccc", 1)
     save(figure, "fig-8a-openness.png")
+
+
+def plain(axis, colour, width):
+    """No ticks, and a frame of this colour."""
+    axis.set_xticks([])
+    axis.set_yticks([])
+    axis.grid(False)
+    for side in axis.spines.values():
+        side.set(visible=True, color=colour, linewidth=width)
 
 
 # Noise
@@ -405,8 +410,7 @@ WORDS = {"pass": "holds", "known-failure": "**fails**", "fail": "**fails**", "in
 
 
 def number(v):
-    digits = 4 if abs(v) < 0.1 else 3
-    return f"{v:.{digits}f}".replace("-", "−")
+    return f"{v:g}".replace("-", "−")
 
 
 def limit(l):
@@ -432,8 +436,8 @@ def claims():
             continue
         v = worst(found)
         where = v["scene"] + (f", {v['case']['estimator']}" if v.get("case") else ", judge")
-        value = str(Value(v["metric"])) if v["metric"].get("value") is not None else "–"
-        lines.append(f"| {gate['name']} | {where} | {value} | {limit(v['limit'])} | {WORDS[v['outcome']]} |")
+        against = f" of {v['against']['name']}" if v.get("against") else ""
+        lines.append(f"| {gate['name']} | {where} | {between(v['interval'])} | {limit(v['limit'])}{against} | {WORDS[v['outcome']]} |")
     return "\n".join(lines)
 
 
