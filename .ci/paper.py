@@ -11,6 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import markdown
 import matplotlib
 import numpy as np
 
@@ -428,8 +429,8 @@ def worst(verdicts):
     return min(verdicts, key=lambda v: (order.index(v["outcome"]), v["margin"] if v["margin"] is not None else 9e9))
 
 
-def claims():
-    lines = ["| claim | nearest to its limit | measured | limit | |", "|---|---|--:|---|---|"]
+def claims(short=False):
+    lines = ["| claim | measured | |", "|---|--:|---|"] if short else ["| claim | nearest to its limit | measured | limit | |", "|---|---|--:|---|---|"]
     for gate in paper["suite"]["gates"]:
         found = [v for v in paper["verdicts"] if v["gate"] == gate["name"]]
         if not found or gate["name"].startswith("GPU"):
@@ -437,6 +438,9 @@ def claims():
         v = worst(found)
         where = v["scene"] + (f", {v['case']['estimator']}" if v.get("case") else ", judge")
         against = f" of {v['against']['name']}" if v.get("against") else ""
+        if short:
+            lines.append(f"| {gate['name']} | {between(v['interval'])} | {WORDS[v['outcome']]} |")
+            continue
         lines.append(f"| {gate['name']} | {where} | {between(v['interval'])} | {limit(v['limit'])}{against} | {WORDS[v['outcome']]} |")
     return "\n".join(lines)
 
@@ -450,6 +454,19 @@ def renderers_agree():
             by.setdefault((v["gate"], k["scene"], k["estimator"]), {})[k["renderer"]] = v["outcome"]
     both = {k: o for k, o in by.items() if len(o) == 2}
     return len(both), [k for k, o in both.items() if o["cpu"] != o["gpu"]]
+
+
+STYLE = """body { font: 17px/1.55 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color: #1b1b1b; background: #fff }
+h1, h2 { line-height: 1.2; margin-top: 2.2rem } img { max-width: 100%; height: auto } table { border-collapse: collapse; font-size: 15px; display: block; overflow-x: auto }
+th, td { border: 1px solid #d0d0d0; padding: .3rem .6rem; vertical-align: top; text-align: left } th { background: #f3f3f3 }
+a { color: #005a9c } pre { background: #f5f5f5; padding: .8rem; overflow-x: auto }"""
+
+
+def html(text):
+    """The page for browsers; pictures and links stay beside it."""
+    body = markdown.markdown(text, extensions=["tables", "fenced_code"])
+    head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>The paper, measured</title><style>{STYLE}</style>'
+    return f'<!doctype html><html lang="en"><head>{head}</head><body>\n{body}\n</body></html>\n'
 
 
 def fill():
@@ -484,6 +501,11 @@ def fill():
         return str(found)
 
     (out / "report.md").write_text(re.sub(r"\{\{(.*?)\}\}", put, page))
+    (out / "report.html").write_text(html((out / "report.md").read_text()))
+    readme = Path("README.md")
+    first, rest = readme.read_text().split("<!-- claims, by .ci/peers paper -->\n")
+    last = rest.split("<!-- end of claims -->\n")[1]
+    readme.write_text(f"{first}<!-- claims, by .ci/peers paper -->\n{claims(short=True)}\n<!-- end of claims -->\n{last}")
 
 
 paper, sweep = records()
