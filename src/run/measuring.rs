@@ -121,20 +121,19 @@ impl Subject<'_> {
                 (_, Some(Truth { fault: Some(e), .. })) => Err(format!("its converged image cannot be used: {e}")),
                 (None, _) | (_, None) => Err(NOT_RENDERED.to_owned()),
             };
-            let (own, replicates, converged) = match own {
-                Ok((own, converged)) => (own, images(case).unwrap_or(&own.replicates), converged),
+            let regions = self.regions(index);
+            let looked_at = own.and_then(|(own, converged)| {
+                let replicates = images(case).unwrap_or(&own.replicates);
+                let warnings = self.of_commands(case, replicates, &converged.mean, regions)?;
+                Ok((own, replicates, converged, warnings))
+            });
+            let (own, replicates, converged, warnings) = match looked_at {
+                Ok(looked_at) => looked_at,
                 Err(e) => {
                     records.push(CaseRecord::failed(case, e));
                     continue;
                 }
             };
-            let regions = self.regions(index);
-            let [wrong, warnings] = self.of_commands(case, replicates, &converged.mean, regions);
-            if !wrong.is_empty() {
-                let why = format!("its images are wrong: {}", wrong.join("; and: "));
-                records.push(CaseRecord::failed(case, why));
-                continue;
-            }
             let method = measured(replicates, converged, regions);
             let on_classic = self.plan.suite.classic_beside(case);
             let beside = truth(&on_classic).filter(|t| case.estimator != *classic && t.fault.is_none());
@@ -168,13 +167,22 @@ impl Subject<'_> {
         records
     }
 
-    /// What is wrong and what is doubtful in images that somebody else's program left; nothing in ours.
-    fn of_commands(&self, case: &Case, images: &[Vec<f32>], converged: &[f32], regions: &Regions) -> [Vec<String>; 2] {
+    /// What is doubtful in images that somebody else's program left, or what is wrong with them; nothing in
+    /// ours.
+    fn of_commands(
+        &self,
+        case: &Case,
+        images: &[Vec<f32>],
+        converged: &[f32],
+        regions: &Regions,
+    ) -> Result<Vec<String>, String> {
         let Some(by) = self.plan.suite.renderers.iter().find(|r| case.is_external() && r.file.name == case.renderer)
         else {
-            return Default::default();
+            return Ok(Vec::new());
         };
-        external::diagnosed(images, converged, regions, self.facts.resolution, by.external.image.encoding.is_some())
+        let is_declared = by.external.image.encoding.is_some();
+        let [wrong, doubtful] = external::diagnosed(images, converged, regions, self.facts.resolution, is_declared);
+        if wrong.is_empty() { Ok(doubtful) } else { Err(format!("its images are wrong: {}", wrong.join("; and: "))) }
     }
 
     /// The metrics of a case under each occluder of several.

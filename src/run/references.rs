@@ -184,6 +184,16 @@ impl Prepared<'_> {
                 images,
             });
         }
+        self.write_list(folder, beside, scenes)
+    }
+
+    /// Writes the suite, and the list with all hashes last.
+    fn write_list(
+        &self,
+        folder: &Path,
+        beside: &[&str],
+        scenes: Vec<SceneReferences>,
+    ) -> Result<ReferencesFile, RunError> {
         let path = folder.join(SUITE);
         let unwritten = |e: &dyn std::fmt::Display| DiskError::content(&path, format!("it cannot be written: {e}"));
         let suite = toml::to_string_pretty(&without_programs(&self.plan.suite.file)).map_err(|e| unwritten(&e))?;

@@ -23,7 +23,7 @@ use crate::{
         regions::{Region, Regions},
         tiles,
     },
-    record::{CaseRecord, HandedIn, Intervals, Machine, Record, RecordFolder, Shows, Source},
+    record::{CaseRecord, HandedIn, Intervals, Machine, Record, RecordFolder, Shows, Source, Timing},
     render::Estimator,
     suite::{Case, Method, Plan, Platform, Suite, SuiteError},
 };
@@ -135,10 +135,9 @@ impl Ready<'_> {
                 continue;
             }
             let loaded = references.load(&plan, scene).map_err(RunError::Kit)?;
-            let facts = scene.facts.clone();
             let mut rendered = loaded.rendered;
             let (regions, occluders, on_screen) = (loaded.regions, loaded.occluders, loaded.on_screen);
-            let subject = Subject { plan: &plan, facts, regions, occluders, on_screen };
+            let subject = Subject { plan: &plan, facts: scene.facts.clone(), regions, occluders, on_screen };
             let judged = subject.judge(folder, &rendered)?;
             let scored = Scored { subject: &subject, judged: &judged, handed: &own };
             for handed in &own {
@@ -157,8 +156,7 @@ impl Ready<'_> {
         let gpu = format!("none was used: the images were handed in, of the renderer '{}'", by.renderer);
         let mut info = super::suite_info(&plan);
         info.methods.retain(|name, _| !foreign.contains(name));
-        let mut timing = super::timing();
-        timing.seconds = start.elapsed().as_secs_f64();
+        let timing = Timing { seconds: start.elapsed().as_secs_f64(), ..super::timing() };
         let record = super::record(super::Found {
             plan: &plan,
             suite: info,
@@ -215,17 +213,10 @@ impl Scored<'_> {
         let index = self.subject.method(&handed.case);
         let shows = handed.source.as_ref().map_or(Shows::Openness, |s| s.shows);
         let all = self.subject.regions(index);
-        // Where a whole frame without AO is black, the ratio is not known.
-        let known = all.only(|i| shows == Shows::Openness || images.iter().all(|r| r[i as usize].is_finite()));
-        if known.pixels(Region::All).is_empty() {
-            return failed("no pixel that sees a surface holds a number in all of its images".to_owned());
-        }
-        let width = self.subject.facts.resolution[0];
-        for (replicate, image) in (0..).zip(images) {
-            if let Err(e) = faults::check(image, |_| true, &known, replicate, width) {
-                return failed(e.to_string());
-            }
-        }
+        let known = match self.known(all, images, shows) {
+            Ok(known) => known,
+            Err(why) => return failed(why),
+        };
         let foreign;
         let converged = match rendered.truths.get(&index) {
             Some(truth) => &truth.converged,
@@ -267,6 +258,19 @@ impl Scored<'_> {
             source: handed.source.clone(),
             occluders,
         }
+    }
+
+    /// Where images are measured: where a whole frame without AO is black, the ratio is not known.
+    fn known(&self, all: &Regions, images: &[Vec<f32>], shows: Shows) -> Result<Regions, String> {
+        let known = all.only(|i| shows == Shows::Openness || images.iter().all(|r| r[i as usize].is_finite()));
+        if known.pixels(Region::All).is_empty() {
+            return Err("no pixel that sees a surface holds a number in all of its images".to_owned());
+        }
+        let width = self.subject.facts.resolution[0];
+        for (replicate, image) in (0..).zip(images) {
+            faults::check(image, |_| true, &known, replicate, width).map_err(|e| e.to_string())?;
+        }
+        Ok(known)
     }
 
     /// The judge over the pixels that a case is measured on: where a ratio is not known in some, over

@@ -81,14 +81,6 @@ pub fn gather(
     let defaults = Defaults { estimator: declaration.estimator.clone(), rays: declaration.rays, free };
     let found = intake::files(folder, &scenes, &estimators, &defaults)?;
     let mut warnings = found.warnings;
-    let renderer = match &declaration.renderer {
-        Some(name) => name.clone(),
-        None => {
-            let (name, told) = name_of(folder);
-            warnings.extend(told);
-            name
-        }
-    };
     // A curve that is found on the images later explains codes, too.
     let is_fitted = matches!(declaration.curve, Some(CurveChoice::Fit(_)));
     let mut reader = Reader { folder, references, declared: declaration.of_images(), is_declared: is_fitted };
@@ -99,30 +91,21 @@ pub fn gather(
     };
     let doubts = self_check::check(&reader, known, &checks)?;
     reader.is_declared = declaration.encoding.is_some();
-    if handed.is_empty() {
-        let scenes = scenes[..scenes.len() - 1].join(", ");
-        let what = format!(
-            "{}: no image is called like a scene of the kit; names are SCENE.ESTIMATOR.RAYS.REPLICATE.exr, the scenes {scenes}",
-            folder.display()
-        );
-        return Err(ScoreError::Nothing(lines(what, &warnings)));
-    }
+    check_taken(folder, &scenes[..scenes.len() - 1], &handed, (found.not_taken, is_partial), &warnings)?;
     check_used(declaration, &handed).map_err(ScoreError::Declared)?;
     if let Some(own) = declaration.estimator.as_deref().filter(|own| !estimators.contains(own)) {
         let known = estimators.join(", ");
         warnings
             .push(format!("The estimator '{own}' is none of the kit's ({known}): of it there is no converged image."));
     }
-    // A slip in a name must not leave out what was to be judged.
-    if found.not_taken > 0 && !is_partial {
-        let what = format!(
-            "{}: {} images are not taken; an estimator that the kit does not have is named by --estimator; --partial leaves \
-             such images out",
-            folder.display(),
-            found.not_taken
-        );
-        return Err(ScoreError::NotTaken(lines(what, &warnings)));
-    }
+    let renderer = match &declaration.renderer {
+        Some(name) => name.clone(),
+        None => {
+            let (name, told) = name_of(folder);
+            warnings.extend(told);
+            name
+        }
+    };
     warnings.extend(doubts);
     let mut cases: Vec<CaseImages> = handed.iter().map(|h| reader.case(h, &renderer)).collect();
     let curve = undo_curve(&mut cases, references, declaration)?;
@@ -137,6 +120,34 @@ pub fn gather(
     }
     let kit = format!("aogauge {}, suite {}, seed {}", file.tool, file.suite, file.seed);
     Ok(Gathered { cases, handed_in: HandedIn { renderer, kit, curve, warnings } })
+}
+
+/// Refuses a folder without an image of the kit's scenes, and images that are not taken: a slip in a name
+/// must not leave out what was to be judged.
+fn check_taken(
+    folder: &Path,
+    scenes: &[&str],
+    handed: &[Handed],
+    (not_taken, is_partial): (usize, bool),
+    why: &[String],
+) -> Result<(), ScoreError> {
+    let folder = folder.display();
+    if handed.is_empty() {
+        let scenes = scenes.join(", ");
+        let what = format!(
+            "{folder}: no image is called like a scene of the kit; names are SCENE.ESTIMATOR.RAYS.REPLICATE.exr, the scenes \
+             {scenes}"
+        );
+        return Err(ScoreError::Nothing(lines(what, why)));
+    }
+    if not_taken > 0 && !is_partial {
+        let what = format!(
+            "{folder}: {not_taken} images are not taken; an estimator that the kit does not have is named by --estimator; \
+             --partial leaves such images out"
+        );
+        return Err(ScoreError::NotTaken(lines(what, why)));
+    }
+    Ok(())
 }
 
 /// Refuses an estimator or a number of rays that is declared and that no image is of: the
@@ -305,7 +316,7 @@ mod tests {
         assert_eq!(found, [&all[3]]);
         let told = stray(found[0], Path::new("mine"));
         assert!(told.starts_with("a.classic.8.exr: of classic, 8 rays are in few scenes only"), "{told}");
-        assert_eq!(strays(&all[1..]), [&handed("", "", 0); 0]);
+        assert!(strays(&all[1..]).is_empty());
     }
 
     #[test]

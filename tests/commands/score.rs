@@ -589,7 +589,7 @@ fn what_is_masked_is_masked_in_the_judge_too() {
     let record = |dark: bool| {
         let images = Images::new();
         for (r, image) in replicates.iter().enumerate() {
-            let light = |i: usize| if dark && (i / size[0] as usize) % 2 == 0 { 0.0 } else { 0.5 };
+            let light = |i: usize| if dark && (i / size[0] as usize).is_multiple_of(2) { 0.0 } else { 0.5 };
             let with: Vec<f32> = image.iter().enumerate().map(|(i, v)| v * light(i)).collect();
             let without: Vec<f32> = (0..image.len()).map(light).collect();
             images.exr(&format!("curtain-arcade.classic.4.{r:04}.with.exr"), &with, size);
