@@ -32,6 +32,12 @@ fn main() -> io::Result<()> {
     }
     let hash: String = sha.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
     println!("cargo::rustc-env=AOGAUGE_BUILD={hash}");
+    #[cfg(feature = "embree")]
+    {
+        println!("cargo::rerun-if-changed=benches/embree.cpp");
+        cc::Build::new().cpp(true).file("benches/embree.cpp").opt_level(3).flag("-mavx2").compile("aogauge-embree");
+        println!("cargo::rustc-link-lib=embree3");
+    }
     Ok(())
 }
 

@@ -1,5 +1,7 @@
 //! What `aogauge bench` measures: how long AO takes, and what the extension adds.
 
+pub mod cpu;
+
 use crate::{
     render::{
         Estimator, Geometry, Job, ReceiverPlane, RenderError,

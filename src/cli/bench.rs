@@ -1,5 +1,7 @@
 //! `aogauge bench`
 
+mod cpu;
+
 use super::{Exit, Failure, Format, json, on_gpu::OnGpu, print, run::bar, scene::load, tell};
 use crate::{
     bench::{GpuBench, MOST_RAYS, Settings, VERSION, scene},
@@ -10,9 +12,10 @@ use crate::{
 };
 use std::{io::Write, path::PathBuf};
 
-/// Measure how fast AO is, and what the extension costs.
+/// Measure how fast AO is, and how fast rays are.
 #[derive(Debug, clap::Subcommand)]
 pub enum Verb {
+    Cpu(cpu::Args),
     Gpu(GpuArgs),
 }
 
@@ -65,6 +68,7 @@ fn resolution(text: &str) -> Result<[u32; 2], String> {
 
 pub fn execute(verb: &Verb) -> Result<Exit, Failure> {
     match verb {
+        Verb::Cpu(args) => cpu::execute(args),
         Verb::Gpu(args) => gpu(args),
     }
 }

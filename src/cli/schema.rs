@@ -2,7 +2,7 @@
 
 use super::{Exit, Failure, explain::Explanations, golden, json, print};
 use crate::{
-    bench::GpuBench,
+    bench::{GpuBench, cpu::CpuBench},
     changes::Changes,
     compare::Comparison,
     flatland::Study,
@@ -45,8 +45,10 @@ enum Of {
     Score,
     /// flatland.json
     Flatland,
-    /// bench.json
+    /// bench.json of `bench gpu`.
     Bench,
+    /// bench.json of `bench cpu`.
+    BenchCpu,
     /// What `compare --format json` prints of images.
     Compare,
     /// What `explain --format json` prints.
@@ -81,6 +83,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
         Of::GoldenList => schemars::schema_for!(golden::Listing),
         Of::GoldenSize => schemars::schema_for!(golden::Sizes),
         Of::Bench => schemars::schema_for!(GpuBench),
+        Of::BenchCpu => schemars::schema_for!(CpuBench),
     };
     print(&json(&schema)?)?;
     Ok(Exit::Pass)

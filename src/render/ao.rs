@@ -1,6 +1,11 @@
 //! Openness, ray by ray: `classic`, `obscurance`, `extended`,
 //! `extended-obscurance`. Twin: `gpu/shaders/ao.wgsl`.
 
+mod group;
+mod traced;
+
+pub use traced::Traced;
+
 use super::{
     Extension, Faces, Falloff, Openness, ReceiverPlane, SecondaryOrigin, Sides,
     sampler::{Sampler, turn},
@@ -35,6 +40,9 @@ pub struct Decided {
 }
 
 impl Decided {
+    /// Nothing is known yet.
+    const NONE: Decided = Decided { hit: false, mu: 0.0, closed: 0, secondary_rays: 0 };
+
     /// mu times the open secondary rays, or mu where there are none: summed in
     /// these units, openness without falloff is exact.
     pub fn units(self) -> f32 {
@@ -85,6 +93,9 @@ pub struct Shading<'a> {
     frame: [Vec3; 2],
     ao: AoScale,
     method: Openness,
+    /// Where on the circle from d1 to d2 secondary rays go, where that is not left to
+    /// chance: cosine and sine.
+    circle: [[f32; 2]; Extension::MOST as usize],
 }
 
 impl<'a> Shading<'a> {
@@ -92,43 +103,62 @@ impl<'a> Shading<'a> {
     /// with a scale of its own overrides it.
     pub fn new(tracer: &'a Tracer, point: Vec3, normal: Vec3, ao: AoScale, method: Openness) -> Self {
         let origin = point + normal * tracer.offset();
-        Shading { tracer, origin, normal, frame: tangents(normal), ao: method.scale.on(ao), method }
+        let mut circle = [[0.0; 2]; Extension::MOST as usize];
+        if let Some(extension) = method.extension.filter(|e| !e.is_turned()) {
+            for (i, place) in circle.iter_mut().enumerate().take(extension.secondary_rays as usize) {
+                *place = on_circle(i as u32, 0.0, extension);
+            }
+        }
+        Shading { tracer, origin, normal, frame: tangents(normal), ao: method.scale.on(ao), method, circle }
     }
 
     /// Decides one primary ray. `place` chooses its direction; `shift`, in
     /// [0, 1), the origin of secondary rays along it and how their fan is turned,
     /// where the method leaves that to chance.
     #[inline]
-    pub fn decide(&self, [u, v]: [f32; 2], shift: [f32; 2]) -> Decided {
-        let [cos_phi, sin_phi] = turn(v);
-        let (sin_theta, cos_theta) = (u.sqrt(), (1.0 - u).sqrt());
-        let [t, b] = self.frame;
-        // The direction in the plane of the surface, and across it.
-        let along = t * cos_phi + b * sin_phi;
-        let w = along * sin_theta + self.normal * cos_theta;
-        let (hit, mu, length) = self.primary(w);
+    pub fn decide(&self, place: [f32; 2], shift: [f32; 2]) -> Decided {
+        let primary = self.primary_at(place);
+        let (hit, mu, length) = self.primary(primary.direction);
         let Some(extension) = self.method.extension else {
             return Decided { hit, mu, closed: 0, secondary_rays: 0 };
         };
         let mut decided = Decided { hit, mu, closed: 0, secondary_rays: extension.secondary_rays };
         if mu > 0.0 {
-            // d1 = w x n / |w x n| and d2 = w x d1, written out in the frame of
-            // the surface: there d1 has no singularity where w is parallel to n.
-            let d1 = t * sin_phi - b * cos_phi;
-            let d2 = along * cos_theta - self.normal * sin_theta;
-            let share = if extension.origin == SecondaryOrigin::Jittered { shift[0] } else { 0.5 };
-            let fan = Fan {
-                middle: self.origin + w * (share * length),
-                height: share * length * cos_theta,
-                sin_theta,
-                directions: [d1, d2],
-            };
+            let fan = self.fan(primary, length, shift, extension);
             for i in 0..extension.secondary_rays {
-                let segment = fan.segment(i, shift[1], extension, self.ao.secondary_radius);
+                let segment = fan.segment(self, i, shift[1], extension);
                 decided.closed |= u32::from(self.closed(&segment)) << i;
             }
         }
         decided
+    }
+
+    /// The primary ray that two numbers in [0, 1) choose.
+    #[inline]
+    fn primary_at(&self, [u, v]: [f32; 2]) -> Primary {
+        let turn = turn(v);
+        let tilt = [u.sqrt(), (1.0 - u).sqrt()];
+        let [t, b] = self.frame;
+        let along = t * turn[0] + b * turn[1];
+        Primary { turn, tilt, along, direction: along * tilt[0] + self.normal * tilt[1] }
+    }
+
+    /// The secondary rays of a primary one, which has `length` before its hit.
+    #[inline]
+    fn fan(&self, primary: Primary, length: f32, shift: [f32; 2], extension: Extension) -> Fan {
+        let Primary { turn: [cos_phi, sin_phi], tilt: [sin_theta, cos_theta], along, direction: w } = primary;
+        let [t, b] = self.frame;
+        // d1 = w x n / |w x n| and d2 = w x d1, written out in the frame of the surface:
+        // there d1 has no singularity where w is parallel to n.
+        let d1 = t * sin_phi - b * cos_phi;
+        let d2 = along * cos_theta - self.normal * sin_theta;
+        let share = if extension.origin == SecondaryOrigin::Jittered { shift[0] } else { 0.5 };
+        Fan {
+            middle: self.origin + w * (share * length),
+            height: share * length * cos_theta,
+            sin_theta,
+            directions: [d1, d2],
+        }
     }
 
     /// Whether a primary ray meets something, its mu, and how much of R it has
@@ -143,8 +173,8 @@ impl<'a> Shading<'a> {
             return (hit, f32::from(u8::from(!hit)), radius);
         }
         let distance = match self.method.faces {
-            Faces::Both => self.tracer.distance(&ray, |_| true),
-            Faces::Front => self.tracer.distance(&ray, |corners| faces(corners, w)),
+            Faces::Both => self.tracer.distance(&ray),
+            Faces::Front => self.tracer.scalar().distance_by(&ray, |corners| faces(corners, w)),
         };
         distance.map_or((false, 1.0, radius), |d| (true, falloff.mu(d, radius), d.min(radius)))
     }
@@ -153,7 +183,7 @@ impl<'a> Shading<'a> {
     fn occluded(&self, ray: &Ray) -> bool {
         match self.method.faces {
             Faces::Both => self.tracer.occluded(ray),
-            Faces::Front => self.tracer.occluded_by(ray, |corners| faces(corners, ray.direction)),
+            Faces::Front => self.tracer.scalar().occluded_by(ray, |corners| faces(corners, ray.direction)),
         }
     }
 
@@ -174,21 +204,53 @@ impl<'a> Shading<'a> {
 
     /// Openness over `rays` rays, and how each was decided.
     pub fn openness(&self, rays: u32, sampler: &Sampler) -> (f32, Decisions) {
-        let chance = self.method.extension.is_some_and(|e| e.is_turned() || e.origin == SecondaryOrigin::Jittered);
         let mut sum = 0.0;
         let mut decisions = Decisions::default();
-        for i in 0..rays {
-            let shift = if chance { sampler.pair(i, 1) } else { [0.0; 2] };
-            let decided = self.decide(sampler.pair(i, 0), shift);
-            sum += f64::from(decided.units());
-            if i < 32 {
-                decisions.primary |= u32::from(decided.hit) << i;
-                decisions.first |= (decided.closed & 1) << i;
-                decisions.second |= (decided.closed >> 1 & 1) << i;
+        let mut decided = [Decided::NONE; group::MOST];
+        for first in (0..rays).step_by(group::MOST) {
+            let decided = &mut decided[..((rays - first) as usize).min(group::MOST)];
+            self.decide_all(first, sampler, decided);
+            for (i, decided) in decided.iter().enumerate() {
+                sum += f64::from(decided.units());
+                if first == 0 {
+                    decisions.primary |= u32::from(decided.hit) << i;
+                    decisions.first |= (decided.closed & 1) << i;
+                    decisions.second |= (decided.closed >> 1 & 1) << i;
+                }
             }
         }
         (self.method.mean(sum, rays), decisions)
     }
+
+    /// Decides samples `first` and following.
+    fn decide_all(&self, first: u32, sampler: &Sampler, decided: &mut [Decided]) {
+        if self.method.falloff == Falloff::Step && self.method.faces == Faces::Both {
+            return self.decide_together(first, sampler, decided);
+        }
+        for (i, decided) in decided.iter_mut().enumerate() {
+            let index = first + i as u32;
+            let shift = if self.has_chance() { sampler.pair(index, 1) } else { [0.0; 2] };
+            *decided = self.decide(sampler.pair(index, 0), shift);
+        }
+    }
+
+    /// Whether secondary rays leave something to chance.
+    fn has_chance(&self) -> bool {
+        self.method.extension.is_some_and(|e| e.is_turned() || e.origin == SecondaryOrigin::Jittered)
+    }
+}
+
+/// A primary ray in the frame of its surface.
+#[derive(Clone, Copy)]
+struct Primary {
+    /// Cosine and sine of its angle about the normal.
+    turn: [f32; 2],
+    /// Sine and cosine of its angle against the normal.
+    tilt: [f32; 2],
+    /// Its unit direction in the plane of the surface.
+    along: Vec3,
+    /// Its unit direction.
+    direction: Vec3,
 }
 
 /// The secondary rays of one primary ray.
@@ -212,15 +274,17 @@ struct Segment {
 }
 
 impl Fan {
-    /// Secondary ray `i`: at an angle from d1 towards d2 of i/n of a half turn,
-    /// of a whole turn where rays go one way.
+    /// Secondary ray `i`.
     #[inline]
-    fn segment(&self, i: u32, turned: f32, extension: Extension, reach: f32) -> Segment {
-        let period = if extension.sides == Sides::Two { 0.5 } else { 1.0 };
-        let turned = if extension.is_turned() { turned } else { 0.0 };
-        let [c, s] = turn((i as f32 + turned) * period / extension.secondary_rays as f32);
+    fn segment(&self, shading: &Shading<'_>, i: u32, turned: f32, extension: Extension) -> Segment {
+        let [c, s] = if extension.is_turned() {
+            on_circle(i, turned, extension)
+        } else {
+            shading.circle[i as usize % shading.circle.len()]
+        };
         let [d1, d2] = self.directions;
         let d = d1 * c + d2 * s;
+        let reach = shading.ao.secondary_radius;
         // d2 goes down, against the normal, by sin(theta) a unit length.
         let slope = s * self.sin_theta;
         let forth = match extension.receiver_plane {
@@ -230,6 +294,14 @@ impl Fan {
         let back = if extension.sides == Sides::Two { reach } else { 0.0 };
         Segment { middle: self.middle, direction: d, back, forth }
     }
+}
+
+/// Cosine and sine of the angle of secondary ray `i` from d1 towards d2: (i +
+/// turned)/n of a half turn, of a whole turn where rays go one way.
+#[inline]
+fn on_circle(i: u32, turned: f32, extension: Extension) -> [f32; 2] {
+    let period = if extension.sides == Sides::Two { 0.5 } else { 1.0 };
+    turn((i as f32 + turned) * period / extension.secondary_rays as f32)
 }
 
 #[cfg(test)]

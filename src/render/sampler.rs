@@ -8,6 +8,7 @@
 //! arithmetic, so both sides draw the same samples to the last bit.
 
 /// Wellons' `lowbias32`: a bijection of 32 bits with low bias.
+#[inline(always)]
 pub fn hash(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x7feb_352d);
@@ -17,11 +18,13 @@ pub fn hash(mut x: u32) -> u32 {
 }
 
 /// A hash of two numbers in order.
+#[inline(always)]
 pub fn combine(a: u32, b: u32) -> u32 {
     hash(a ^ hash(b.wrapping_add(0x9e37_79b9)))
 }
 
 /// Nested uniform (Owen) scramble of a 32-bit fraction.
+#[inline(always)]
 pub fn owen_scramble(x: u32, seed: u32) -> u32 {
     let mut x = x.reverse_bits();
     x ^= x.wrapping_mul(0x3d20_adea);
@@ -35,6 +38,7 @@ pub fn owen_scramble(x: u32, seed: u32) -> u32 {
 /// Point `index` of the first two Sobol dimensions, as 32-bit fractions. The
 /// second generator matrix is Pascal's triangle modulo 2, so five shifts do what
 /// 32 table look-ups would.
+#[inline(always)]
 pub fn sobol(index: u32) -> [u32; 2] {
     let mut y = index;
     y ^= (y & 0xffff_0000) >> 16;
@@ -67,24 +71,41 @@ impl Sampler {
         [owen_scramble(x, hash(seed ^ 0x68bc_21eb)), owen_scramble(y, hash(seed ^ 0x02e5_be93))]
             .map(|v| (v >> 8) as f32 * 2.0f32.powi(-24))
     }
+
+    /// [`Self::pair`] of eight samples from `first` on, side by side: for a compiler to
+    /// turn into SIMD. The same bits.
+    #[inline(always)]
+    pub(super) fn pairs(&self, first: u32, dimension: u32) -> [[f32; 8]; 2] {
+        let seed = combine(self.seed, dimension);
+        let seeds = [hash(seed ^ 0x68bc_21eb), hash(seed ^ 0x02e5_be93)];
+        let mut pairs = [[0.0; 8]; 2];
+        for lane in 0..8 {
+            let point = sobol(owen_scramble(first.wrapping_add(lane as u32), seed));
+            for axis in 0..2 {
+                // Below 2^24, so that it fits a signed number, which is quicker to convert.
+                let bits = (owen_scramble(point[axis], seeds[axis]) >> 8) as i32;
+                pairs[axis][lane] = bits as f32 * 2.0f32.powi(-24);
+            }
+        }
+        pairs
+    }
 }
 
 /// Cosine and sine of 2 pi v for v in [0, 1), by one polynomial on both sides:
 /// the sine and cosine of GPUs are too loose. Error below 2e-7.
-#[inline]
+#[inline(always)]
 pub fn turn(v: f32) -> [f32; 2] {
     let quarters = v * 4.0;
-    let quadrant = (quarters + 0.5).floor();
-    let x = (quarters - quadrant) * std::f32::consts::FRAC_PI_2;
+    // Not `floor`, which is a call on machines without SSE 4.1.
+    let quadrant = (quarters + 0.5) as i32;
+    let x = (quarters - quadrant as f32) * std::f32::consts::FRAC_PI_2;
     let x2 = x * x;
     let s = x * (1.0 + x2 * (-1.0 / 6.0 + x2 * (1.0 / 120.0 + x2 * (-1.0 / 5040.0 + x2 * (1.0 / 362_880.0)))));
     let c = 1.0 + x2 * (-0.5 + x2 * (1.0 / 24.0 + x2 * (-1.0 / 720.0 + x2 * (1.0 / 40_320.0))));
-    match quadrant as u32 & 3 {
-        0 => [c, s],
-        1 => [-s, c],
-        2 => [-c, -s],
-        _ => [s, -c],
-    }
+    // [c, s], [-s, c], [-c, -s], [s, -c], without a branch.
+    let (cosine, sine) = if quadrant & 1 == 1 { (s, c) } else { (c, s) };
+    let sign = |v: f32, turned: i32| f32::from_bits(v.to_bits() ^ (turned as u32 & 2) << 30);
+    [sign(cosine, quadrant + 1), sign(sine, quadrant)]
 }
 
 #[cfg(test)]

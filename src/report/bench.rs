@@ -1,5 +1,7 @@
 //! What `aogauge bench` measured, as tables.
 
+pub mod cpu;
+
 use crate::{
     bench::{GpuBench, MethodBench, SceneBench},
     render::gpu::Clock,

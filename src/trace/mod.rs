@@ -1,23 +1,44 @@
-//! The one place that meets triangles on the CPU: a BVH, any-hit, closest hit and
-//! closest point.
+//! The one place that meets triangles on the CPU. Renderers ask
 //!
-//! The tree is obvhs's `Bvh2`; its traversal is our own, because the library's
-//! triangle test is not watertight and its any-hit has an absolute epsilon. Boxes
-//! are padded by the rounding error of the scene, so that no box hides a triangle
-//! that the triangle test would meet. The GPU walks the same tree folded eight wide.
+//! - [`Tracer::occluded_from`] of all rays of a shaded point together, which share
+//!   their origin and length;
+//! - [`Tracer::occluded_segments`] of rays with origins of their own;
+//! - [`Tracer::closest`], [`Tracer::distance`] and [`Tracer::occluded`] of one ray;
+//! - [`Tracer::scalar`] where only some triangles count.
+//!
+//! The binary tree is obvhs's `Bvh2`; folded eight wide it is walked by our own
+//! traversals, because the library's triangle test is not watertight and its any-hit
+//! has an absolute epsilon. Boxes are padded by the rounding error of the scene, so
+//! that no box hides a triangle that the triangle test would meet. All walks give
+//! the scalar walk's answers, bit by bit, with AVX2 and without: `docs/cpu-speed.md`
+//! tells how. The GPU walks the same tree in eight bits a plane.
 
 mod build;
+mod fan;
+mod fold;
+mod free;
+mod lanes;
+mod nearest;
+mod one;
+mod scalar;
+mod tree8;
 mod triangle;
+mod walk;
 mod wide;
 
 pub use build::Node;
+pub use fan::Fan;
+pub use free::Segments;
+pub use nearest::Nearest;
+pub use scalar::Scalar;
 pub use triangle::Ray;
+pub use walk::Packet;
 pub use wide::{STACK as WIDE_STACK, Wide, WideNode};
 
-use aogauge_scenes::closest_point;
-use glam::{Vec3, Vec3A};
+use glam::Vec3;
+use tree8::Tree8;
 
-/// The deepest tree we walk: the length of the traversal stack.
+/// The deepest tree we walk: the length of the scalar traversal's stack.
 pub const STACK: usize = 64;
 
 /// The nearest triangle along a ray.
@@ -41,33 +62,58 @@ pub struct Tracer {
     nodes: Vec<Node>,
     triangles: Vec<[Vec3; 3]>,
     source: Vec<u32>,
+    /// The leaf of the binary tree that holds each triangle.
+    leaves: Vec<u32>,
     offset: f32,
+    /// The largest coordinate, metres.
+    magnitude: f32,
+    tree: Tree8,
+    /// Whether the machine has what the fast walks take.
+    fast: bool,
 }
 
-/// Slab test against a padded box, widened by the rounding error of the three
-/// operations (Ize, "Robust BVH Ray Traversal", JCGT 2(2), 2013). Returns the
-/// entry distance, infinity for a miss.
-#[inline]
-fn enter(node: &Node, origin: Vec3A, inverse: Vec3A, tmax: f32) -> f32 {
-    let raw: &[f32; 8] = bytemuck::cast_ref(node);
-    let lo = (Vec3A::new(raw[0], raw[1], raw[2]) - origin) * inverse;
-    let hi = (Vec3A::new(raw[4], raw[5], raw[6]) - origin) * inverse;
-    let near = lo.min(hi).max_element().max(0.0);
-    let far = lo.max(hi).min_element().min(tmax);
-    if near <= far * 1.000_000_4 { near } else { f32::INFINITY }
+/// Runs a walk by AVX2 where the machine has it, else by arrays.
+macro_rules! by_lanes {
+    ($fast:expr, $module:ident::$walk:ident [$($n:ident)? $(=$any:literal)?], ($($arg:ident: $type:ty),*) -> $out:ty) => {{
+        #[cfg(target_arch = "x86_64")]
+        if $fast {
+            #[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt")]
+            fn wide $(<const $n: usize>)? ($($arg: $type),*) -> $out {
+                $module::$walk::<lanes::Avx2 $(, $n)? $(, $any)?>($($arg),*)
+            }
+            // SAFETY: `fast` is `has_avx2()` or false, and that asks for all of these.
+            // Tested against the portable walks by `every_answer_is_the_scalar_walks`.
+            return unsafe { wide($($arg),*) };
+        }
+        $module::$walk::<lanes::Plain $(, $n)? $(, $any)?>($($arg),*)
+    }};
 }
 
 impl Tracer {
     /// Builds the tree. The triangles must be finite.
     pub fn new(triangles: &[[Vec3; 3]]) -> Self {
         let magnitude = triangles.iter().flatten().fold(0.0f32, |m, v| m.max(v.abs().max_element()));
-        let (nodes, source) = build::build(triangles, magnitude * 2.0f32.powi(-22));
-        Tracer {
-            nodes,
-            triangles: source.iter().map(|&i| triangles[i as usize]).collect(),
-            source,
-            offset: magnitude * 2.0f32.powi(-19),
+        let pad = magnitude * 2.0f32.powi(-22);
+        let (nodes, source) = build::build(triangles, pad);
+        let triangles: Vec<_> = source.iter().map(|&i| triangles[i as usize]).collect();
+        let mut leaves = vec![0; triangles.len()];
+        for (node, n) in nodes.iter().enumerate().filter(|(_, n)| n.count > 0) {
+            leaves[n.first as usize..][..n.count as usize].fill(node as u32);
         }
+        let tree = Tree8::new(&nodes, &triangles, pad);
+        let offset = magnitude * 2.0f32.powi(-19);
+        Tracer { nodes, triangles, source, leaves, offset, magnitude, tree, fast: lanes::has_avx2() }
+    }
+
+    /// Walks without AVX2, as on machines that have none: to test that, and to time it.
+    #[must_use]
+    pub fn portable(self) -> Self {
+        Tracer { fast: false, ..self }
+    }
+
+    /// Whether it walks by AVX2.
+    pub fn is_fast(&self) -> bool {
+        self.fast
     }
 
     /// The nodes; the root is the first.
@@ -103,264 +149,79 @@ impl Tracer {
         self.offset = offset;
     }
 
+    /// The scalar walk.
+    pub fn scalar(&self) -> Scalar<'_> {
+        Scalar(self)
+    }
+
+    /// Which of up to 8 N rays that leave one point meet anything within `(0, tmax]`:
+    /// a bit each, of those in `mask`; N is 1 to 4. The unit directions of lanes
+    /// outside `mask` may be anything finite.
+    #[inline]
+    pub fn occluded_from<const N: usize>(&self, fan: &Fan, rays: &[Packet; N], mask: u32) -> u32 {
+        let tracer = self;
+        by_lanes!(
+            self.fast,
+            fan::occluded[N],
+            (tracer: &Tracer, fan: &Fan, rays: &[Packet; N], mask: u32) -> u32
+        )
+    }
+
+    /// Which of up to 8 N rays with origins of their own meet anything: a bit each, of
+    /// those in `mask`; N is 1 to 4. Lanes outside `mask` should repeat another
+    /// ([`Segments::fill`]): what they reach is looked at.
+    #[inline]
+    pub fn occluded_segments<const N: usize>(&self, segments: &[Segments; N], mask: u32) -> u32 {
+        let tracer = self;
+        by_lanes!(self.fast, free::occluded[N], (tracer: &Tracer, segments: &[Segments; N], mask: u32) -> u32)
+    }
+
     /// Whether anything lies on the ray within `(0, tmax]`.
     pub fn occluded(&self, ray: &Ray) -> bool {
-        self.occluded_by(ray, |_| true)
+        self.any(ray).is_some()
     }
 
-    /// Whether a triangle that `accept` takes (by its corners) lies on the ray
-    /// within `(0, tmax]`.
-    #[inline]
-    pub fn occluded_by(&self, ray: &Ray, accept: impl Fn(&[Vec3; 3]) -> bool) -> bool {
-        self.walk(ray, ray.tmax, |triangle, tmax| {
-            let corners = &self.triangles[triangle];
-            if ray.meets(corners, tmax).is_some() && accept(corners) { None } else { Some(tmax) }
-        })
-    }
-
-    /// Distance along the ray, within `(0, tmax]`, to the nearest triangle that
-    /// `accept` takes.
-    pub fn distance(&self, ray: &Ray, accept: impl Fn(&[Vec3; 3]) -> bool) -> Option<f32> {
-        let mut nearest = None;
-        self.walk(ray, ray.tmax, |triangle, tmax| {
-            let corners = &self.triangles[triangle];
-            match ray.meets(corners, tmax) {
-                Some((t, _)) if accept(corners) => {
-                    nearest = Some(t);
-                    Some(t)
-                }
-                _ => Some(tmax),
-            }
-        });
-        nearest
+    /// Distance along the ray, within `(0, tmax]`, to the nearest triangle.
+    pub fn distance(&self, ray: &Ray) -> Option<f32> {
+        self.first(ray).map(|met| met.t)
     }
 
     /// The nearest triangle on the ray within `(0, tmax]`; of several at one
     /// distance the first in the scene, whatever the order of the walk.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
-        let mut best: Option<(f32, usize, Vec3)> = None;
-        self.walk(ray, ray.tmax, |triangle, tmax| match ray.meets(&self.triangles[triangle], tmax) {
-            Some((t, weights)) if best.is_none_or(|b| t < b.0 || self.source[triangle] < self.source[b.1]) => {
-                best = Some((t, triangle, weights));
-                Some(t)
-            }
-            _ => Some(tmax),
-        });
-        best.map(|(t, triangle, w)| {
-            let [a, b, c] = self.triangles[triangle];
-            let normal = (b - a).cross(c - a).normalize_or_zero();
-            Hit {
-                t,
-                triangle: self.source[triangle],
-                leaf: triangle as u32,
-                point: a * w.x + b * w.y + c * w.z,
-                normal: if normal.dot(ray.direction) > 0.0 { -normal } else { normal },
-            }
-        })
+        let met = self.first(ray)?;
+        let leaf = self.tree.blocks[met.block as usize].triangle[met.lane] as usize;
+        let (t, weights) = ray.meets(&self.triangles[leaf], met.t)?;
+        Some(self.hit(ray, t, leaf, weights))
     }
 
-    /// Walks the tree along a ray, nearer child first. `test` takes a triangle
-    /// and how far to look, and returns how far to look from there on, or None to
-    /// stop; the walk returns whether it was stopped.
-    #[inline(always)]
-    fn walk(&self, ray: &Ray, tmax: f32, mut test: impl FnMut(usize, f32) -> Option<f32>) -> bool {
-        let origin = Vec3A::from(ray.origin);
-        let inverse = Vec3A::from(ray.inverse);
-        let mut tmax = tmax;
-        let mut stack = [0u32; STACK];
-        let mut height = 0;
-        let Some(root) = self.nodes.first() else {
-            return false;
-        };
-        if enter(root, origin, inverse, tmax) == f32::INFINITY {
-            return false;
-        }
-        let mut node = root;
-        loop {
-            if node.count > 0 {
-                for triangle in node.first..node.first + node.count {
-                    match test(triangle as usize, tmax) {
-                        Some(t) => tmax = t,
-                        None => return true,
-                    }
-                }
-            } else {
-                let first = node.first as usize;
-                let (mut near, mut far) = (&self.nodes[first], &self.nodes[first + 1]);
-                let (mut t_near, mut t_far) = (enter(near, origin, inverse, tmax), enter(far, origin, inverse, tmax));
-                let mut far_index = first + 1;
-                if t_far < t_near {
-                    std::mem::swap(&mut near, &mut far);
-                    std::mem::swap(&mut t_near, &mut t_far);
-                    far_index = first;
-                }
-                if t_far < f32::INFINITY {
-                    stack[height] = far_index as u32;
-                    height += 1;
-                }
-                if t_near < f32::INFINITY {
-                    node = near;
-                    continue;
-                }
-            }
-            if height == 0 {
-                return false;
-            }
-            height -= 1;
-            node = &self.nodes[stack[height] as usize];
+    #[inline]
+    fn first(&self, ray: &Ray) -> Option<one::Met> {
+        let tracer = self;
+        by_lanes!(self.fast, one::walk[=false], (tracer: &Tracer, ray: &Ray) -> Option<one::Met>)
+    }
+
+    #[inline]
+    fn any(&self, ray: &Ray) -> Option<one::Met> {
+        let tracer = self;
+        by_lanes!(self.fast, one::walk[=true], (tracer: &Tracer, ray: &Ray) -> Option<one::Met>)
+    }
+
+    /// What is known of a hit on a triangle, by its barycentric weights.
+    fn hit(&self, ray: &Ray, t: f32, leaf: usize, weights: Vec3) -> Hit {
+        let [a, b, c] = self.triangles[leaf];
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        Hit {
+            t,
+            triangle: self.source[leaf],
+            leaf: leaf as u32,
+            point: a * weights.x + b * weights.y + c * weights.z,
+            normal: if normal.dot(ray.direction) > 0.0 { -normal } else { normal },
         }
     }
-
-    /// The nearest point to `point`, within `radius`, on the triangles that
-    /// `accept` takes (by their corners).
-    pub fn nearest(&self, point: Vec3, radius: f32, accept: impl Fn(&[Vec3; 3]) -> bool) -> Option<Nearest> {
-        self.nearest_of(point, radius, |leaf| accept(&self.triangles[leaf as usize]))
-    }
-
-    /// The nearest point to `point`, within `radius`, on the triangles that
-    /// `accept` takes, by their numbers in [`Self::triangles`].
-    pub fn nearest_of(&self, point: Vec3, radius: f32, accept: impl Fn(u32) -> bool) -> Option<Nearest> {
-        let mut best = radius * radius;
-        let mut found = None;
-        let mut stack: Vec<u32> = if self.nodes.is_empty() { vec![] } else { vec![0] };
-        while let Some(index) = stack.pop() {
-            let node = &self.nodes[index as usize];
-            if box_distance_squared(node, point) > best {
-                continue;
-            }
-            if node.count == 0 {
-                stack.extend([node.first, node.first + 1]);
-                continue;
-            }
-            for triangle in node.first..node.first + node.count {
-                let corners = &self.triangles[triangle as usize];
-                let at = closest_point(point, corners);
-                let d = (at - point).length_squared();
-                if d <= best && accept(triangle) {
-                    best = d;
-                    found = Some(Nearest { point: at, distance: d.sqrt(), triangle });
-                }
-            }
-        }
-        found
-    }
-
-    /// Calls `visit` with the corners of every triangle whose tree leaf comes
-    /// within `radius` of `point`: at least those that come so near themselves.
-    pub fn near(&self, point: Vec3, radius: f32, mut visit: impl FnMut(&[Vec3; 3])) {
-        let mut stack: Vec<u32> = if self.nodes.is_empty() { vec![] } else { vec![0] };
-        while let Some(index) = stack.pop() {
-            let node = &self.nodes[index as usize];
-            if box_distance_squared(node, point) > radius * radius {
-                continue;
-            }
-            if node.count == 0 {
-                stack.extend([node.first, node.first + 1]);
-            } else {
-                self.triangles[node.first as usize..(node.first + node.count) as usize].iter().for_each(&mut visit);
-            }
-        }
-    }
-}
-
-/// A point on a triangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Nearest {
-    /// The point.
-    pub point: Vec3,
-    /// Its distance from where the search began, metres.
-    pub distance: f32,
-    /// The triangle, as numbered in [`Tracer::triangles`].
-    pub triangle: u32,
-}
-
-fn box_distance_squared(node: &Node, point: Vec3) -> f32 {
-    (point.clamp(Vec3::from(node.min), Vec3::from(node.max)) - point).length_squared()
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::render::sampler::Sampler;
-
-    /// Triangles of many sizes and directions, the same every time.
-    fn soup(n: u32) -> Vec<[Vec3; 3]> {
-        let point = |i: u32, salt: u32| {
-            let [a, b] = Sampler::new(7, i, salt).pair(0, 0);
-            let [c, _] = Sampler::new(8, i, salt).pair(0, 0);
-            Vec3::new(a, b, c) * 2.0 - 1.0
-        };
-        (0..n)
-            .map(|i| {
-                let centre = point(i, 0);
-                let size = if i % 10 == 0 { 0.8 } else { 0.1 };
-                [1, 2, 3].map(|k| centre + point(i, k) * size)
-            })
-            .collect()
-    }
-
-    fn rays(n: u32, tmax: f32) -> impl Iterator<Item = Ray> {
-        (0..n).map(move |i| {
-            let [a, b] = Sampler::new(1, i, 1).pair(0, 0);
-            let [c, d] = Sampler::new(2, i, 1).pair(0, 0);
-            let z = 1.0 - 2.0 * d;
-            let (s, phi) = ((1.0 - z * z).sqrt(), 6.283_185_5 * c);
-            let direction = Vec3::new(s * phi.cos(), s * phi.sin(), z).normalize();
-            Ray::new(Vec3::new(a, b, c) * 2.4 - 1.2, direction, tmax)
-        })
-    }
-
-    #[test]
-    fn the_tree_agrees_with_brute_force() {
-        let triangles = soup(400);
-        let tracer = Tracer::new(&triangles);
-        let mut hits = 0;
-        for ray in rays(20_000, 1.5) {
-            let brute = triangles
-                .iter()
-                .enumerate()
-                .filter_map(|(i, t)| ray.meets(t, ray.tmax).map(|(t, _)| (t, i as u32)))
-                .min_by(|a, b| a.0.total_cmp(&b.0));
-            assert_eq!(tracer.occluded(&ray), brute.is_some());
-            assert_eq!(tracer.closest(&ray).map(|h| h.t), brute.map(|b| b.0));
-            hits += usize::from(brute.is_some());
-        }
-        assert!(hits > 5_000, "the test must meet something: {hits}");
-    }
-
-    #[test]
-    fn no_ray_slips_through_the_edges_and_corners_of_a_closed_box() {
-        let mut mesh = aogauge_scenes::Mesh::default();
-        mesh.push_box(Vec3::new(-1.0, -0.7, -1.3), Vec3::new(0.9, 1.1, 1.0));
-        let triangles: Vec<_> = mesh.corners().collect();
-        let tracer = Tracer::new(&triangles);
-        for (i, ray) in rays(20_000, 1.0).enumerate() {
-            let inside = ray.origin.clamp(Vec3::new(-0.9, -0.6, -1.2), Vec3::new(0.8, 1.0, 0.9));
-            let [a, b, _] = triangles[i % triangles.len()];
-            let s = (i % 101) as f32 / 100.0;
-            let target = a + (b - a) * s;
-            let ray = Ray::new(inside, (target - inside).normalize(), 10.0);
-            assert!(tracer.occluded(&ray), "{inside} to {target}");
-        }
-    }
-
-    #[test]
-    fn nearest_agrees_with_brute_force() {
-        let triangles = soup(200);
-        let tracer = Tracer::new(&triangles);
-        for ray in rays(500, 1.0) {
-            let brute = triangles
-                .iter()
-                .map(|t| (closest_point(ray.origin, t) - ray.origin).length())
-                .min_by(f32::total_cmp)
-                .unwrap();
-            let found = tracer.nearest(ray.origin, 5.0, |_| true).unwrap();
-            assert!((found.distance - brute).abs() < 1e-6);
-            assert!((found.point - ray.origin).length() - brute < 1e-6);
-            let mut near = 0;
-            tracer.near(ray.origin, brute, |_| near += 1);
-            assert!(near > 0);
-            assert_eq!(tracer.nearest(ray.origin, brute * 0.99, |_| true), None);
-        }
-    }
-}
+mod check;
+#[cfg(test)]
+mod tests;

@@ -22,8 +22,8 @@ pub struct Ray {
     /// Length, metres; a hit at exactly this distance counts.
     pub tmax: f32,
     pub(super) inverse: Vec3,
-    axes: [usize; 3],
-    shear: Vec3,
+    pub(super) axes: [usize; 3],
+    pub(super) shear: Vec3,
 }
 
 /// 1/x, finite for every x: a ray in the plane of a box face then gives 0 * big
@@ -33,17 +33,23 @@ fn bounded_reciprocal(x: f32) -> f32 {
     if x.abs() < 1e-20 { 1e20f32.copysign(x) } else { 1.0 / x }
 }
 
+/// The axis along which a direction goes furthest.
+#[inline(always)]
+pub(super) fn main_axis(direction: Vec3) -> usize {
+    let a = direction.abs();
+    if a.x > a.y {
+        if a.x > a.z { 0 } else { 2 }
+    } else if a.y > a.z {
+        1
+    } else {
+        2
+    }
+}
+
 impl Ray {
     /// A ray; `direction` must be of unit length for `tmax` to be in metres.
     pub fn new(origin: Vec3, direction: Vec3, tmax: f32) -> Self {
-        let a = direction.abs();
-        let z = if a.x > a.y {
-            if a.x > a.z { 0 } else { 2 }
-        } else if a.y > a.z {
-            1
-        } else {
-            2
-        };
+        let z = main_axis(direction);
         let axes = [(z + 1) % 3, (z + 2) % 3, z];
         let d = direction.to_array();
         let sz = 1.0 / d[z];

@@ -7,24 +7,20 @@
 //! shorter arithmetic of its test may err, so no ray misses what the binary tree
 //! meets. The library's own eight-wide traversal does: it pads nothing.
 
-use super::{Node, Tracer};
+use super::{
+    Node, Tracer,
+    fold::{Costs, Plans, WIDTH, collect},
+};
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
-
-/// Children of a node.
-pub const WIDTH: usize = 8;
-
-/// Triangles of a leaf, at most: their number is written in three bits.
-const LEAF: u32 = 3;
 
 /// The deepest tree the GPU walks: the length of its stack. A level puts one
 /// entry there at most.
 pub const STACK: usize = 24;
 
-/// Cost of one node, and of one triangle, in the same unit; what counts is their
-/// ratio, which is the paper's.
-const NODE: f32 = 1.0;
-const TRIANGLE: f32 = 0.3;
+/// Costs of the paper; a leaf has three triangles at most, because their number is
+/// written in three bits.
+const COSTS: Costs = Costs { node: 1.0, leaf: 0.0, triangle: 0.3, most: 3, reach: 0.0 };
 
 /// A node, 80 bytes.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -62,29 +58,6 @@ pub struct Wide {
     pub depth: usize,
 }
 
-/// What becomes of a subtree that may take some number of slots of a node.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Plan {
-    /// One slot: a leaf.
-    Leaf,
-    /// One slot: a node of its own.
-    Inner,
-    /// Its left child takes so many of the slots, its right one the others.
-    Split(u8),
-    /// As with one slot less.
-    Fewer,
-}
-
-/// Costs and plans of a binary node for one to seven slots, and the split of its
-/// eight where it becomes a node of its own.
-#[derive(Clone, Copy)]
-struct Choice {
-    cost: [f32; WIDTH - 1],
-    plan: [Plan; WIDTH - 1],
-    own: u8,
-    triangles: u32,
-}
-
 impl Wide {
     /// Folds the binary tree of a tracer, so that the expected cost of a ray is
     /// least among all ways to fold it (the paper's section 3).
@@ -97,8 +70,7 @@ impl Wide {
         if nodes.is_empty() {
             return wide;
         }
-        let mut choices = vec![None; nodes.len()];
-        choose(nodes, 0, &mut choices);
+        let plans = Plans::new(nodes, COSTS);
         wide.depth = 0;
         // Breadth first: nodes near the root, which all rays visit, lie together.
         let mut level = vec![(0usize, 0u32)];
@@ -106,7 +78,7 @@ impl Wide {
             wide.depth += 1;
             let mut next = Vec::new();
             for (at, root) in level {
-                wide.fold(nodes, &choices, at, root, pad, &mut next);
+                wide.fold(nodes, &plans, at, root, pad, &mut next);
             }
             level = next;
         }
@@ -114,16 +86,8 @@ impl Wide {
     }
 
     /// Writes one node, and makes room for its children.
-    fn fold(
-        &mut self,
-        nodes: &[Node],
-        choices: &[Option<Choice>],
-        at: usize,
-        root: u32,
-        pad: f32,
-        next: &mut Vec<(usize, u32)>,
-    ) {
-        let children = children(nodes, choices, root);
+    fn fold(&mut self, nodes: &[Node], plans: &Plans, at: usize, root: u32, pad: f32, next: &mut Vec<(usize, u32)>) {
+        let children = plans.children(nodes, root);
         let slots = ordered(nodes, &children);
         let [min, max] = union(nodes, children.iter().map(|c| c.0)).map(Vec3::from);
         let (origin, max) = (min - pad, max + pad);
@@ -165,73 +129,6 @@ impl Wide {
     }
 }
 
-/// Works out the plans of a subtree, children first.
-fn choose(nodes: &[Node], index: u32, choices: &mut [Option<Choice>]) -> Choice {
-    let node = &nodes[index as usize];
-    let area = half_area(node);
-    let mut choice =
-        Choice { cost: [f32::INFINITY; WIDTH - 1], plan: [Plan::Fewer; WIDTH - 1], own: 0, triangles: node.count };
-    let mut split = [(f32::INFINITY, 0u8); WIDTH + 1];
-    if node.count == 0 {
-        let left = choose(nodes, node.first, choices);
-        let right = choose(nodes, node.first + 1, choices);
-        choice.triangles = left.triangles + right.triangles;
-        for (slots, best) in split.iter_mut().enumerate().skip(2) {
-            for k in 1..slots.min(WIDTH) {
-                let rest = slots - k;
-                if rest < WIDTH {
-                    let cost = left.cost[k - 1] + right.cost[rest - 1];
-                    if cost < best.0 {
-                        *best = (cost, k as u8);
-                    }
-                }
-            }
-        }
-        choice.cost[0] = split[WIDTH].0 + area * NODE;
-        choice.plan[0] = Plan::Inner;
-        choice.own = split[WIDTH].1;
-    }
-    let as_leaf = area * choice.triangles as f32 * TRIANGLE;
-    if choice.triangles <= LEAF && as_leaf <= choice.cost[0] {
-        choice.cost[0] = as_leaf;
-        choice.plan[0] = Plan::Leaf;
-    }
-    for (slots, &(cost, k)) in split.iter().enumerate().take(WIDTH).skip(2) {
-        (choice.cost[slots - 1], choice.plan[slots - 1]) =
-            if cost < choice.cost[slots - 2] { (cost, Plan::Split(k)) } else { (choice.cost[slots - 2], Plan::Fewer) };
-    }
-    choices[index as usize] = Some(choice);
-    choice
-}
-
-/// The binary nodes that become the children of a node of its own, and which of
-/// them are leaves.
-fn children(nodes: &[Node], choices: &[Option<Choice>], root: u32) -> Vec<(u32, bool)> {
-    let node = &nodes[root as usize];
-    let mut found = Vec::with_capacity(WIDTH);
-    if node.count > 0 {
-        // Only a tree of one leaf has such a root.
-        return vec![(root, true)];
-    }
-    let own = choices[root as usize].map_or(1, |c| usize::from(c.own));
-    let mut work = vec![(node.first + 1, WIDTH - own), (node.first, own)];
-    while let Some((index, mut slots)) = work.pop() {
-        let Some(choice) = &choices[index as usize] else { continue };
-        while choice.plan[slots - 1] == Plan::Fewer {
-            slots -= 1;
-        }
-        match choice.plan[slots - 1] {
-            Plan::Leaf => found.push((index, true)),
-            Plan::Split(k) => {
-                let first = nodes[index as usize].first;
-                work.extend([(first + 1, slots - usize::from(k)), (first, usize::from(k))]);
-            }
-            Plan::Inner | Plan::Fewer => found.push((index, false)),
-        }
-    }
-    found
-}
-
 /// Gives children their slots. A ray takes its slots in the order of `slot xor
 /// octant`, octant the signs of its direction: so slot s is best taken by the
 /// child that lies furthest against the direction of signs s. The best pair
@@ -259,28 +156,12 @@ fn ordered(nodes: &[Node], children: &[(u32, bool)]) -> [Option<(u32, bool)>; WI
     slots
 }
 
-/// The triangles of a subtree.
-fn collect(nodes: &[Node], root: u32, order: &mut Vec<u32>) {
-    let node = &nodes[root as usize];
-    if node.count > 0 {
-        order.extend(node.first..node.first + node.count);
-    } else {
-        collect(nodes, node.first, order);
-        collect(nodes, node.first + 1, order);
-    }
-}
-
 fn union(nodes: &[Node], of: impl Iterator<Item = u32>) -> [[f32; 3]; 2] {
     let (min, max) = of.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), i| {
         let n = &nodes[i as usize];
         (min.min(n.min.into()), max.max(n.max.into()))
     });
     [min.to_array(), max.to_array()]
-}
-
-fn half_area(node: &Node) -> f32 {
-    let d = Vec3::from(node.max) - Vec3::from(node.min);
-    d.x * d.y + d.y * d.z + d.z * d.x
 }
 
 /// The least power of two, as the exponent of a float, that 255 steps of which

@@ -1,6 +1,9 @@
-//! `aogauge bench gpu`, as a user meets it.
+//! `aogauge bench`, as a user meets it.
 
-use aogauge::bench::GpuBench;
+use aogauge::bench::{
+    GpuBench,
+    cpu::{CpuBench, Kind},
+};
 use std::process::{Command, Output};
 
 fn aogauge(args: &[&str]) -> Output {
@@ -54,6 +57,41 @@ fn what_is_wrong_is_named() {
         (["--rounds", "0"], "1..="),
     ] {
         let output = aogauge(&[&["bench", "gpu"], &args[..]].concat());
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {message}");
+        assert!(message.contains(says), "{args:?}: {message}");
+    }
+}
+
+/// Rays on the CPU: every kind, on one thread and two; all ways meet the same.
+#[test]
+fn cpu_rays_are_counted_by_kind_and_thread() {
+    let dir = tempfile::tempdir().unwrap();
+    let args = ["bench", "cpu", "--scene", "curtain-arcade", "--size", "24", "--rays", "8,16,32", "--radius", "0.25"];
+    let more = ["--threads", "1,2", "--rounds", "3", "--format", "json", "--out", dir.path().to_str().unwrap()];
+    let output = aogauge(&[&args[..], &more[..]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let bench: CpuBench = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(bench, serde_json::from_slice(&std::fs::read(dir.path().join("bench.json")).unwrap()).unwrap());
+    let scene = &bench.scenes[0];
+    assert!(scene.points > 1500 && scene.points <= 6 * 24 * 24, "{}", scene.points);
+    let of_one = [(Kind::AnyHit, 8), (Kind::AnyHit, 16), (Kind::AnyHit, 32), (Kind::Segments, 16), (Kind::Closest, 8)];
+    let expected: Vec<_> = [1, 2].iter().flat_map(|&t| of_one.map(|(kind, rays)| (kind, rays, t))).collect();
+    assert_eq!(scene.races.iter().map(|r| (r.kind, r.rays, r.threads)).collect::<Vec<_>>(), expected);
+    for race in &scene.races {
+        assert!(race.hit > 0.0 && race.hit < 1.0, "{race:?}");
+        assert_eq!(race.radius.is_none(), race.kind == Kind::Closest);
+        for way in &race.ways {
+            assert!(way.million_rays_a_second > 0.0 && way.at_best >= way.million_rays_a_second, "{way:?}");
+            assert!(way.more_hits == 0 || way.name.starts_with("Embree"), "{way:?}");
+        }
+        assert!(race.ways.iter().any(|w| w.name == "portable") && race.ways.iter().any(|w| w.name == "scalar"));
+    }
+    let page = std::fs::read_to_string(dir.path().join("bench.md")).unwrap();
+    assert!(page.contains("| any hit, R = 0.25 m, 8 rays a point |") && page.contains("2 threads"), "{page}");
+    for (args, says) in [(["--rays", "12"], "8, 16, 32"), (["--radius", "0"], "0.001"), (["--threads", "0"], "1..=256")]
+    {
+        let output = aogauge(&[&["bench", "cpu"], &args[..]].concat());
         let message = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{args:?}: {message}");
         assert!(message.contains(says), "{args:?}: {message}");

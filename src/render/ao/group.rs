@@ -1,0 +1,246 @@
+//! Rays of a shaded point decided together: directions eight at a time, all primary
+//! rays by one walk of the tree, then the secondary rays of those that are open. What
+//! `decide` says of each, bit by bit.
+
+use super::{Decided, Primary, Segment, Shading};
+use crate::{
+    render::sampler::{Sampler, turn},
+    trace::{Packet, Segments},
+};
+use pulp::{Arch, NullaryFnOnce};
+
+/// The most rays that go together.
+pub(super) const MOST: usize = 32;
+
+/// Eight rays in the frame of a surface, side by side.
+#[derive(Clone, Copy)]
+struct Eight {
+    turn: [[f32; 8]; 2],
+    tilt: [[f32; 8]; 2],
+    /// Numbers left to chance.
+    shift: [[f32; 8]; 2],
+}
+
+impl Eight {
+    const NONE: Eight = Eight { turn: [[0.0; 8]; 2], tilt: [[0.0; 8]; 2], shift: [[0.0; 8]; 2] };
+}
+
+/// The work of drawing a group, compiled for AVX2 too. Multiplications and additions are
+/// not fused in either, so the bits are the same.
+struct Draw<'a> {
+    shading: &'a Shading<'a>,
+    sampler: &'a Sampler,
+    first: u32,
+    chance: bool,
+    drawn: &'a mut [Eight],
+    directions: &'a mut [Packet; 4],
+}
+
+impl NullaryFnOnce for Draw<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Shading { frame: [t, b], normal, .. } = *self.shading;
+        for (pack, (eight, direction)) in self.drawn.iter_mut().zip(self.directions).enumerate() {
+            let first = self.first + 8 * pack as u32;
+            let [u, v] = self.sampler.pairs(first, 0);
+            for lane in 0..8 {
+                let [cos_phi, sin_phi] = turn(v[lane]);
+                let (sin_theta, cos_theta) = (u[lane].sqrt(), (1.0 - u[lane]).sqrt());
+                for axis in 0..3 {
+                    let along = t[axis] * cos_phi + b[axis] * sin_phi;
+                    direction.0[axis][lane] = along * sin_theta + normal[axis] * cos_theta;
+                }
+                eight.turn[0][lane] = cos_phi;
+                eight.turn[1][lane] = sin_phi;
+                eight.tilt[0][lane] = sin_theta;
+                eight.tilt[1][lane] = cos_theta;
+            }
+            if self.chance {
+                eight.shift = self.sampler.pairs(first, 1);
+            }
+        }
+    }
+}
+
+/// Secondary rays that wait for their walk.
+struct Waiting {
+    segments: [Segments; 4],
+    /// Which primary ray each is of, and which of its secondary rays.
+    of: [(u8, u8); MOST],
+    count: usize,
+}
+
+impl Shading<'_> {
+    /// Decides samples `first` and following, at most [`MOST`], of a method without
+    /// falloff that takes both faces.
+    pub(super) fn decide_together(&self, first: u32, sampler: &Sampler, decided: &mut [Decided]) {
+        let packs = decided.len().div_ceil(8).min(4);
+        let mut drawn = [Eight::NONE; 4];
+        let mut directions = [Packet::splat(self.normal); 4];
+        let drawn = &mut drawn[..packs];
+        let chance = self.has_chance();
+        Arch::new().dispatch(Draw { shading: self, sampler, first, chance, drawn, directions: &mut directions });
+
+        let all = u32::MAX >> (32 - decided.len().clamp(1, 32));
+        let hit = self.occluded_together(&directions, packs, all);
+        let extension = self.method.extension;
+        let secondary_rays = extension.map_or(0, |e| e.secondary_rays);
+        for (i, decided) in decided.iter_mut().enumerate() {
+            let hit = hit >> i & 1 == 1;
+            *decided = Decided { hit, mu: f32::from(u8::from(!hit)), closed: 0, secondary_rays };
+        }
+        let Some(extension) = extension else { return };
+        let mut waiting = Waiting { segments: [Segments::EMPTY; 4], of: [(0, 0); MOST], count: 0 };
+        let [t, b] = self.frame;
+        let mut open = all & !hit;
+        while open != 0 {
+            let i = open.trailing_zeros() as usize;
+            open &= open - 1;
+            let (of, lane) = (&drawn[i / 8], i % 8);
+            let turn = of.turn.map(|v| v[lane]);
+            let primary = Primary {
+                turn,
+                tilt: of.tilt.map(|v| v[lane]),
+                along: t * turn[0] + b * turn[1],
+                direction: directions[i / 8].get(lane),
+            };
+            let shift = of.shift.map(|v| v[lane]);
+            let fan = self.fan(primary, self.ao.radius, shift, extension);
+            for k in 0..secondary_rays {
+                waiting.push(i, k, &fan.segment(self, k, shift[1], extension));
+                if waiting.count == MOST {
+                    self.close(&mut waiting, decided);
+                }
+            }
+        }
+        self.close(&mut waiting, decided);
+    }
+
+    /// Which primary rays meet something within R.
+    fn occluded_together(&self, directions: &[Packet; 4], packs: usize, mask: u32) -> u32 {
+        let fan = crate::trace::Fan { origin: self.origin, normal: self.normal, tmax: self.ao.radius };
+        let [a, b, ..] = *directions;
+        match packs {
+            1 => self.tracer.occluded_from(&fan, &[a], mask),
+            2 => self.tracer.occluded_from(&fan, &[a, b], mask),
+            _ => self.tracer.occluded_from(&fan, directions, mask),
+        }
+    }
+
+    /// Traces what waits.
+    fn close(&self, waiting: &mut Waiting, decided: &mut [Decided]) {
+        let count = std::mem::take(&mut waiting.count);
+        if count == 0 {
+            return;
+        }
+        let packs = count.div_ceil(8);
+        waiting.segments[packs - 1].fill(count - 8 * (packs - 1));
+        let mask = u32::MAX >> (32 - count);
+        let [a, b, c, d] = waiting.segments;
+        let mut closed = match packs {
+            1 => self.tracer.occluded_segments(&[a], mask),
+            2 => self.tracer.occluded_segments(&[a, b], mask),
+            3 => self.tracer.occluded_segments(&[a, b, c, c], mask),
+            _ => self.tracer.occluded_segments(&[a, b, c, d], mask),
+        };
+        while closed != 0 {
+            let (i, k) = waiting.of[closed.trailing_zeros() as usize];
+            closed &= closed - 1;
+            decided[usize::from(i)].closed |= 1 << k;
+        }
+    }
+}
+
+impl Waiting {
+    #[inline]
+    fn push(&mut self, i: usize, k: u32, segment: &Segment) {
+        let Segment { middle, direction, back, forth } = *segment;
+        let at = self.count % MOST;
+        self.segments[at / 8].set(at % 8, middle - direction * back, direction, back + forth);
+        self.of[at] = (i as u8, k as u8);
+        self.count += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        render::{Extension, Falloff, Geometry, Openness, ReceiverPlane, SecondaryOrigin, Sides, gbuffer::GBuffer},
+        scenes::library::scene,
+    };
+    use glam::Vec3;
+
+    /// In all variants of secondary rays and numbers of rays, with AVX2 and without.
+    #[test]
+    fn a_group_decides_as_one_by_one() {
+        let mut closed = [0; 2];
+        for name in ["curtain-arcade", "leaves"] {
+            let scene = scene(name).unwrap();
+            let fast = Geometry::new(&scene).unwrap().tracer;
+            let portable = fast.clone().portable();
+            let points = GBuffer::new(&fast, &scene.measure.view()).surfaces;
+            let paper = Extension::of_the_paper(ReceiverPlane::Counts);
+            let clipped = Extension { receiver_plane: ReceiverPlane::Clipped, ..paper };
+            let eight = Extension { secondary_rays: 8, sides: Sides::One, ..clipped };
+            let jittered = Extension { secondary_rays: 3, origin: SecondaryOrigin::Jittered, ..clipped };
+            let extensions = [None, Some(paper), Some(clipped), Some(eight), Some(jittered)];
+            for (pixel, s) in points.iter().enumerate().filter_map(|(i, s)| Some((i, s.as_ref()?))).step_by(97) {
+                let rays = [1, 4, 8, 13, 16, 21, 32][pixel % 7];
+                for extension in extensions {
+                    let method = Openness { extension, ..Openness::plain(Falloff::Step) };
+                    let sampler = Sampler::new(3, pixel as u32, 1);
+                    for tracer in [&fast, &portable] {
+                        let shading = Shading::new(tracer, s.point, s.normal, scene.ao, method);
+                        for first in [0, 32, 4096] {
+                            let mut decided = vec![Decided::NONE; rays];
+                            shading.decide_together(first, &sampler, &mut decided);
+                            for (i, decided) in (first..).zip(decided) {
+                                let shift = if shading.has_chance() { sampler.pair(i, 1) } else { [0.0; 2] };
+                                assert_eq!(decided, shading.decide(sampler.pair(i, 0), shift), "{name} {pixel} {i}");
+                                closed[0] += u32::from(decided.hit);
+                                closed[1] += decided.closed.count_ones();
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        assert!(closed.into_iter().all(|n| n > 500), "the test must meet something: {closed:?}");
+    }
+
+    #[test]
+    fn directions_side_by_side_have_the_bits_of_one_by_one() {
+        let tracer = crate::trace::Tracer::new(&[]);
+        for i in 0..3000u32 {
+            let [a, b] = Sampler::new(5, i, 0).pair(0, 0);
+            let normal = super::super::cosine_distributed(Vec3::Y, [a, b]).0;
+            let normal = if i % 2 == 0 { normal } else { -normal }.normalize();
+            let ao = aogauge_scenes::AoScale { radius: 1.0, secondary_radius: 0.25 };
+            let shading = Shading::new(&tracer, Vec3::ZERO, normal, ao, Openness::plain(Falloff::Step));
+            let sampler = Sampler::new(1, i, 2);
+            let (mut drawn, mut directions) = ([Eight::NONE; 4], [Packet::splat(Vec3::X); 4]);
+            let draw = Draw {
+                shading: &shading,
+                sampler: &sampler,
+                first: i,
+                chance: true,
+                drawn: &mut drawn,
+                directions: &mut directions,
+            };
+            Arch::new().dispatch(draw);
+            for k in 0..32 {
+                let index = i + k as u32;
+                let (expected, cosine) = super::super::cosine_distributed(normal, sampler.pair(index, 0));
+                assert_eq!(
+                    directions[k / 8].get(k % 8).to_array().map(f32::to_bits),
+                    expected.to_array().map(f32::to_bits)
+                );
+                assert_eq!(drawn[k / 8].tilt[1][k % 8], cosine);
+                assert_eq!(drawn[k / 8].shift.map(|v| v[k % 8]), sampler.pair(index, 1));
+            }
+        }
+    }
+}
