@@ -212,7 +212,7 @@ def fig4():
         Line2D([], [], color=BLACK, lw=1, label="open primary ray, length R"), Line2D([], [], color=RED, lw=1, label="closed primary ray"),
         Line2D([], [], color=BLUE, lw=2.2, label="open secondary ray, ±R'"), Line2D([], [], color=ORANGE, lw=2.2, label="closed secondary ray"),
     ]
-    figure.legend(handles=handles, loc="outside upper center", ncols=4)
+    figure.legend(handles=handles, loc="outside upper center", ncols=2)
     p = next(p for p in traced["profiles"] if (round(p["width"], 3), round(p["gap"], 3)) == (0.02, 0.1))
     for c, colour in zip(p["curves"], (RED, BLUE)):
         t, o = np.array(c["closed"]).T
@@ -223,7 +223,7 @@ def fig4():
     bottom.set_ylim(0, 1.05)
     bottom.set_xlabel("distance from the curtain's middle along the transect, m")
     bottom.legend(loc="lower right", ncols=2)
-    bottom.set_xlim(-0.3, 0.46)
+    bottom.set_xlim(-0.28, 0.48)
     save(figure, "fig-4-rays.svg")
 
 

@@ -89,7 +89,7 @@ fn point(geometry: &Geometry, scene: &Scene, x: f32, pixel: u32) -> Value {
         Shading::new(&geometry.tracer, Vec3::new(x, 0.0, 0.1), Vec3::Y, scene.ao, extended(ReceiverPlane::Clipped));
     let sampler = Sampler::new(3, pixel, 0);
     let flat = |p: Vec3| Vec2::new(p.x, p.y).to_array();
-    let rays: Vec<Value> = (0..16)
+    let rays: Vec<Value> = (0..10)
         .map(|i| {
             let Traced { from, to, decided, secondary } = shading.traced(sampler.pair(i, 0), [0.0; 2]);
             let secondary: Vec<Value> = secondary
@@ -110,7 +110,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let scene = scene(0.02, 0.10)?;
     let geometry = Geometry::new(&scene)?;
     let points: Vec<Value> =
-        [0.0, 0.1, 0.2].iter().zip(0..).map(|(&x, pixel)| point(&geometry, &scene, x, pixel)).collect();
+        [0.0, 0.22].iter().zip(0..).map(|(&x, pixel)| point(&geometry, &scene, x, pixel)).collect();
     let all = json!({
         "radius": RADIUS, "secondary_radius": scene.ao.secondary_radius,
         "rays": RAYS, "replicates": REPLICATES, "profiles": profiles, "points": points,
