@@ -75,6 +75,7 @@ impl Sampler {
     /// [`Self::pair`] of eight samples from `first` on, side by side: for a compiler to
     /// turn into SIMD. The same bits.
     #[inline(always)]
+    #[allow(clippy::needless_range_loop)] // lanes
     pub(super) fn pairs(&self, first: u32, dimension: u32) -> [[f32; 8]; 2] {
         let seed = combine(self.seed, dimension);
         let seeds = [hash(seed ^ 0x68bc_21eb), hash(seed ^ 0x02e5_be93)];

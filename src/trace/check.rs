@@ -15,13 +15,16 @@ use glam::Vec3;
 use std::path::Path;
 
 /// Rays, those that the scalar walk alone meets something on, those that the wide ones
-/// alone do, those on which the wide ones differ from each other.
+/// alone do, those on which the wide ones differ from each other; and closest hits that
+/// are another triangle's, as near as rounding can tell: at an edge, which triangle is
+/// left out because another was found first depends on the order of a walk.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Counts {
     rays: u64,
     missed: u64,
     false_hits: u64,
     differ: u64,
+    beside: u64,
 }
 
 impl Counts {
@@ -124,7 +127,10 @@ fn check(scene: &Scene, rays: u64) -> [Counts; 3] {
             closest.rays += 1;
             closest.missed += u64::from(truth.is_some() && a.is_none());
             // Field by field, bits and all.
-            closest.false_hits += u64::from(a.is_some() && a != truth);
+            let beside =
+                a.zip(truth).is_some_and(|(a, b)| a.triangle != b.triangle && (a.t - b.t).abs() <= fast.offset());
+            closest.beside += u64::from(a != truth && beside);
+            closest.false_hits += u64::from(a.is_some() && a != truth && !beside);
             closest.differ += u64::from(a != b);
             assert_eq!(fast.distance(&ray), a.map(|h| h.t));
         }
@@ -136,8 +142,9 @@ fn check(scene: &Scene, rays: u64) -> [Counts; 3] {
 fn every_answer_is_the_scalar_walks() {
     for name in ["atrium", "curtain-arcade", "leaves", "blinds"] {
         for counts in check(&library::scene(name).unwrap(), 200_000) {
-            assert_eq!(counts, Counts { rays: counts.rays, ..Counts::default() }, "{name}");
-            assert!(counts.rays >= 49_000);
+            let Counts { rays, beside, .. } = counts;
+            assert_eq!(counts, Counts { rays, beside, ..Counts::default() }, "{name}");
+            assert!(rays >= 49_000 && beside * 10_000 <= rays, "{name}: {counts:?}");
         }
     }
 }
@@ -155,11 +162,12 @@ fn ten_million_rays_a_scene() {
         let scene = scene.unwrap();
         let lines = ["fans", "segments", "closest hits"].iter().zip(check(&scene, millions * 1_000_000));
         for (kind, c) in lines {
-            let Counts { rays, missed, false_hits, differ } = c;
+            let Counts { rays, missed, false_hits, differ, beside } = c;
             wrong += missed + false_hits + differ;
+            let name = &scene.name;
             text += &format!(
-                "{:8} {kind:12} {rays:9} rays: {missed} missed, {false_hits} false, {differ} differ between AVX2 and portable\n",
-                scene.name
+                "{name:8} {kind:12} {rays:9} rays: {missed} missed, {false_hits} false, {beside} of another triangle at \
+                 an edge, {differ} differ between AVX2 and portable\n"
             );
         }
     }

@@ -72,6 +72,7 @@ pub struct Plain([f32; 8]);
 
 impl Plain {
     #[inline(always)]
+    #[allow(clippy::needless_range_loop)] // lanes
     fn zip(self, b: Self, f: impl Fn(f32, f32) -> f32) -> Self {
         let mut out = [0.0; 8];
         for i in 0..8 {

@@ -237,18 +237,20 @@ pub(super) fn slabs<L: Lanes>(planes: [L; 6], slopes: [L; 6], tmax: L) -> (u32, 
     (from.le(to.mul(L::splat(1.000_001))), from)
 }
 
-/// The same for one ray, `near_planes` the row that it comes to first by axis.
+/// The same for one ray, `near_planes` the row that it comes to first by axis. Not fused:
+/// at an edge the closest hit may depend on the order of the walk, which must be the
+/// same on any machine.
 #[inline(always)]
 pub(super) fn slabs_of_one<L: Lanes>(node: &Node8, near_planes: [usize; 3], slopes: [L; 6], tmax: L) -> (u32, L) {
     let [x, y, z] = near_planes;
     let row = |i: usize| &node.planes[i];
     let far = |i: usize| if i < 3 { i + 3 } else { i - 3 };
-    let x0 = L::load(row(x)).mul_sub(slopes[0], slopes[3]);
-    let y0 = L::load(row(y)).mul_sub(slopes[1], slopes[4]);
-    let z0 = L::load(row(z)).mul_sub(slopes[2], slopes[5]);
-    let x1 = L::load(row(far(x))).mul_sub(slopes[0], slopes[3]);
-    let y1 = L::load(row(far(y))).mul_sub(slopes[1], slopes[4]);
-    let z1 = L::load(row(far(z))).mul_sub(slopes[2], slopes[5]);
+    let x0 = L::load(row(x)).mul(slopes[0]).sub(slopes[3]);
+    let y0 = L::load(row(y)).mul(slopes[1]).sub(slopes[4]);
+    let z0 = L::load(row(z)).mul(slopes[2]).sub(slopes[5]);
+    let x1 = L::load(row(far(x))).mul(slopes[0]).sub(slopes[3]);
+    let y1 = L::load(row(far(y))).mul(slopes[1]).sub(slopes[4]);
+    let z1 = L::load(row(far(z))).mul(slopes[2]).sub(slopes[5]);
     let from = x0.max(y0).max(z0.max(L::splat(0.0)));
     let to = x1.min(y1).min(z1.min(tmax));
     (from.le(to.mul(L::splat(1.000_001))), from)

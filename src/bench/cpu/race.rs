@@ -9,12 +9,15 @@ use std::{
 /// Points that are traced in one go.
 const CHUNK: usize = 1024;
 
+/// Traces the rays of some points.
+type Run<'a> = Box<dyn Fn(Range<usize>, &mut [u8]) + Sync + 'a>;
+
 /// A way to trace the rays of some points.
 pub struct Side<'a> {
     /// As in tables.
     pub name: String,
     /// Writes a bit a ray that meets something: a byte eight rays.
-    pub run: Box<dyn Fn(Range<usize>, &mut [u8]) + Sync + 'a>,
+    pub run: Run<'a>,
 }
 
 /// What a race is over.
@@ -74,6 +77,7 @@ pub fn race(course: Course, sides: &[Side<'_>]) -> Vec<Raced> {
     raced.into_inner().unwrap_or_else(PoisonError::into_inner)
 }
 
+#[allow(clippy::needless_range_loop)] // a step is a chunk of all sides
 fn one_thread(course: Course, sides: &[Side<'_>], thread: usize, barrier: &Barrier) -> Vec<Raced> {
     let Course { points, rays, rounds, threads } = course;
     let bytes = rays / 8;
