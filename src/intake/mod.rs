@@ -10,6 +10,7 @@ mod files;
 mod name;
 mod ratio;
 mod read;
+mod told;
 mod upsample;
 
 pub use curve::{Curve, fit_curve};
@@ -20,6 +21,7 @@ pub use files::{Defaults, Files, Handed, HandedImage, files};
 pub use name::Shown;
 pub use ratio::{Frame, LONE_FRAME, Ratio, frame, ratio};
 pub use read::{Taken, check_numbers, read};
+pub use told::{Keys, examine};
 
 /// A scene of no suite, by whose picture a renderer shows that it holds its images the right
 /// way, saves them linear, and takes R in metres: a scene file. It has no occluder, is like none of its

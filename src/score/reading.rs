@@ -3,7 +3,7 @@
 use super::ScoreError;
 use crate::{
     disk::DiskError,
-    intake::{self, Declared, Finding, Handed, HandedImage, Reference, Shown},
+    intake::{self, Declared, Finding, Handed, HandedImage, Keys, Means, Reference, Shown},
     metrics::regions::Region,
     record::{Intervals, Shows, Source, told_once},
     run::{CaseImages, References},
@@ -204,13 +204,19 @@ impl Reader<'_> {
     /// where it is declared what numbers stand for.
     pub fn of_openness(&self, image: &[f32], reference: &Reference, size: [usize; 2], shows: Shows) -> Diagnosis {
         let mut found = Diagnosis::default();
-        for finding in intake::diagnose(image, reference, size) {
-            let is_declared = matches!(finding, Finding::Encoded { .. }) && self.is_declared;
+        // Frames are no occlusion, whatever is declared of AO.
+        let means = if shows == Shows::Ratio { Means::Openness } else { self.declared.means };
+        let declared = Declared { means, ..self.declared.clone() };
+        for finding in intake::examine(image, reference, size, &declared) {
             if shows == Shows::Ratio && matches!(finding, Finding::Holes { .. }) {
                 continue;
             }
-            let to = if finding.is_doubt() || is_declared { &mut found.doubtful } else { &mut found.wrong };
-            to.push(finding.to_string());
+            // Where a frame is nearly dark, noise alone brings a ratio beyond its range.
+            let is_noise = shows == Shows::Ratio && matches!(finding, Finding::Range { scale: None, .. });
+            let is_declared = matches!(finding, Finding::Encoded { .. }) && self.is_declared;
+            let is_doubt = finding.is_doubt() || is_declared || is_noise;
+            let to = if is_doubt { &mut found.doubtful } else { &mut found.wrong };
+            to.push(finding.told(&declared, Keys::Score));
         }
         found
     }
