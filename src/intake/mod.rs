@@ -15,8 +15,10 @@ mod upsample;
 
 pub use curve::{Curve, fit_curve};
 pub use declared::{Declared, Means, Rows, Share, Upsample};
-pub use detect::read_against;
-pub use diagnose::{FACTORS, Finding, Reference, Scaled, Turn, alike, diagnose, frame_turn, is_rather};
+pub use detect::{Evidence, evidence};
+pub use diagnose::{
+    Disagreement, FACTORS, Finding, Reference, Scaled, Turn, agreement, alike, diagnose, frame_turn, is_rather,
+};
 pub use files::{Defaults, Files, Handed, HandedImage, files};
 pub use name::Shown;
 pub use ratio::{Frame, LONE_FRAME, Ratio, frame, ratio};

@@ -5,6 +5,7 @@
 //! ([`meaning`]), and by how much it is shifted ([`shift`]). Margins are stated where they are used; all of them are measured
 //! against images of 4 rays and of 1 ray, and of other estimators.
 
+mod agreement;
 mod meaning;
 mod place;
 mod range;
@@ -13,6 +14,7 @@ mod shift;
 #[cfg(test)]
 mod tests;
 
+pub use agreement::{Disagreement, agreement};
 pub use place::{Turn, alike};
 
 use samples::Samples;
@@ -41,6 +43,9 @@ pub struct Scaled {
 /// Factors of R that mistaken units lead to: centimetres, inches, decimetres and feet taken
 /// for metres, a radius taken for a diameter, and the other way round.
 pub const FACTORS: [f64; 10] = [0.01, 1.0 / 39.37, 0.1, 1.0 / 3.28, 0.5, 2.0, 3.28, 10.0, 39.37, 100.0];
+
+/// Standard deviation from which on an image, and its reference, tell one encoding from another.
+const TELLING: f64 = 0.03;
 
 /// Something that is wrong with an image, by [`diagnose`].
 #[derive(Clone, Debug, PartialEq)]
@@ -179,7 +184,9 @@ pub fn diagnose(image: &[f32], reference: &Reference, size: [usize; 2]) -> Vec<F
     let plain = meaning.as_ref().and_then(|m| meaning::undone(m, &upright)).unwrap_or(upright);
     let is_explained = meaning.is_some();
     findings.extend(meaning);
-    let like = reference.scaled.iter().find(|s| Some(s.factor) == factor).map_or(&reference.openness, |s| &s.openness);
+    let apart = |s: &Scaled| factor.map_or(f64::INFINITY, |f| (s.factor / f).ln().abs());
+    let nearest = reference.scaled.iter().min_by(|a, b| apart(a).total_cmp(&apart(b))).filter(|_| factor.is_some());
+    let like = nearest.map_or(&reference.openness, |s| &s.openness);
     let shifted = shift::find(&plain, like, size);
     let far = || if is_explained { None } else { shift::far(&plain, like, size) };
     findings.extend(shifted.or_else(far).map(|pixels| Finding::Shifted { pixels }));
@@ -207,11 +214,13 @@ pub(super) fn distance(image: &[f32], reference: &Reference, size: [usize; 2]) -
     meaning::left(&upright, &reference.openness, size[0])[0]
 }
 
-/// Whether an image can be compared with the reference at all: of its size, and not the same
-/// everywhere where it is not.
-pub(super) fn faults_aside(image: &[f32], reference: &Reference, size: [usize; 2]) -> bool {
+/// Whether an image tells what its numbers stand for: it and its reference vary.
+pub(super) fn is_telling(image: &[f32], reference: &Reference, size: [usize; 2]) -> bool {
     let whole = image.len() == reference.openness.len() && size[0].checked_mul(size[1]) == Some(image.len());
-    whole && Samples::new(image, &reference.openness).pairs() > 0
+    let both = Samples::new(image, &reference.openness);
+    // Of its own deviation.
+    let own = Samples::new(&reference.openness, image);
+    whole && both.pairs() > 0 && both.deviation() >= TELLING && own.deviation() >= TELLING
 }
 
 /// 0 to the last bit at every pixel of a scene that is nearly open everywhere. Openness that is drawn
