@@ -196,9 +196,14 @@ pub fn hex(bytes: &[u8]) -> String {
 
 /// The sRGB code of linear light, 1 for white; what is brighter is white too.
 pub fn srgb(v: f32) -> u8 {
-    let v = v.clamp(0.0, 1.0);
-    let encoded = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-    (encoded * 255.0).round() as u8
+    (code(v.clamp(0.0, 1.0)) * 255.0).round() as u8
+}
+
+/// The sRGB code, from 0 to 1, of linear light: the inverse of [`linear`].
+pub fn code(light: f32) -> f32 {
+    let v = light.abs();
+    let code = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+    code.copysign(light)
 }
 
 /// The linear light of an sRGB code from 0 to 1, by IEC 61966-2-1; beyond that range by

@@ -109,7 +109,11 @@ fn curve(text: &str) -> Result<CurveChoice, String> {
 
 impl From<ScoreError> for Failure {
     fn from(e: ScoreError) -> Self {
-        let exit = if matches!(e, ScoreError::Nothing(_)) { Exit::Nothing } else { Exit::Usage };
+        let exit = match e {
+            ScoreError::Nothing(_) => Exit::Nothing,
+            ScoreError::Disagrees(_) => Exit::Incomplete,
+            _ => Exit::Usage,
+        };
         Failure { exit, message: e.to_string() }
     }
 }

@@ -1,56 +1,75 @@
-//! Which encoding an image has whose maker did not say.
+//! Which encoding images have whose maker did not say.
 
 use super::{
-    Declared, IntakeError, Reference, Taken,
-    diagnose::{distance, faults_aside},
+    Declared, IntakeError, Means, Reference,
+    diagnose::{distance, is_telling},
     read,
 };
-use crate::metrics::image::Encoding;
+use crate::{layers::linear, metrics::image::Encoding};
 use std::path::Path;
 
-/// sRGB codes must bring an image so much nearer to its reference than linear openness does,
+/// sRGB codes must bring images so much nearer to their references than linear openness does,
 /// in mean square: noise is not in it, and where nothing tells the two apart, as in images of
 /// one ray, linear is taken.
 const NEARER: f64 = 0.8;
 
-/// [`read`], and where integers are stored without a declared encoding, the one of `linear` and
-/// `srgb` that brings the first image nearer to the reference; a warning says which.
+/// How far a file's images are from their reference taken as linear and as sRGB codes, mean squares, summed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Evidence {
+    linear: f64,
+    srgb: f64,
+    /// Images that it is of.
+    pub images: usize,
+}
+
+impl Evidence {
+    /// Of both.
+    #[must_use]
+    pub fn with(self, other: Evidence) -> Evidence {
+        Evidence {
+            linear: self.linear + other.linear,
+            srgb: self.srgb + other.srgb,
+            images: self.images + other.images,
+        }
+    }
+
+    /// What it speaks for; None where there is none.
+    pub fn encoding(&self) -> Option<Encoding> {
+        let encoding = if self.srgb < NEARER * self.linear { Encoding::Srgb } else { Encoding::Linear };
+        (self.images > 0).then_some(encoding)
+    }
+}
+
+/// What a file of integers without a declared encoding tells of it. None of floats; images that hardly vary, or
+/// whose scene does not, have no say.
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_against(
+pub fn evidence(
     path: &Path,
     declared: &Declared,
     view: [u32; 2],
     reference: &Reference,
-) -> Result<Taken, IntakeError> {
+) -> Result<Option<Evidence>, IntakeError> {
     let taken = read(path, declared, view)?;
-    let size = view.map(|side| side as usize);
-    let comparable = taken.replicates.first().is_some_and(|i| faults_aside(i, reference, size));
-    if !taken.undeclared || !comparable {
-        return Ok(taken);
+    if !taken.undeclared {
+        return Ok(None);
     }
-    let of = |encoding| {
-        let taken = read(path, &Declared { encoding: Some(encoding), ..declared.clone() }, view)?;
-        let far = taken.replicates.first().map_or(f64::INFINITY, |image| distance(image, reference, size));
-        Ok::<_, IntakeError>((taken, far))
+    let size = view.map(|side| side as usize);
+    let telling = taken.replicates.iter().filter(|i| is_telling(i, reference, size));
+    let decoded = |v: &f32| if declared.means == Means::Occlusion { 1.0 - linear(1.0 - v) } else { linear(*v) };
+    let of = |image: &Vec<f32>| {
+        let codes: Vec<f32> = image.iter().map(decoded).collect();
+        let far = |image: &[f32]| distance(image, reference, size).max(0.0);
+        Evidence { linear: far(image), srgb: far(&codes), images: 1 }
     };
-    let (linear, srgb) = (of(Encoding::Linear)?, of(Encoding::Srgb)?);
-    let mut taken = if srgb.1 < NEARER * linear.1 { srgb.0 } else { linear.0 };
-    taken.undeclared = true;
-    taken.warnings.push(format!(
-        "no encoding is declared and the file stores integers: taken as \"{}\", which is nearer to the reference; \
-         declare `encoding`",
-        taken.encoding.label()
-    ));
-    Ok(taken)
+    Ok(Some(telling.map(of).fold(Evidence::default(), Evidence::with)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{
-        intake::Means,
         render::{Estimator, Geometry, Job, Renderer, cpu::Cpu},
         scenes::library,
     };
@@ -77,6 +96,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         let [width, height] = view.resolution;
+        // White has no say.
+        ImageBuffer::from_pixel(width, height, Luma([255u8])).save(&path).unwrap();
+        let white = evidence(&path, &Declared::default(), view.resolution, &reference).unwrap().unwrap();
+        assert_eq!((white.images, white.encoding()), (0, None));
         for rays in [64, 4] {
             let image = render(rays, 2);
             for occlusion in [false, true] {
@@ -90,13 +113,13 @@ mod tests {
                         .unwrap();
                     let means = if occlusion { Means::Occlusion } else { Means::Openness };
                     let declared = Declared { means, ..Declared::default() };
-                    let taken = read_against(&path, &declared, view.resolution, &reference).unwrap();
-                    assert_eq!((taken.encoding, taken.undeclared), (encoding, true), "{rays} rays, {means:?}");
-                    assert!(taken.warnings.last().unwrap().contains(encoding.label()), "{:?}", taken.warnings);
+                    let found = evidence(&path, &declared, view.resolution, &reference).unwrap().unwrap();
+                    assert_eq!(found.encoding(), Some(encoding), "{rays} rays, {means:?}");
+                    let told = Declared { encoding: Some(encoding), ..declared };
+                    let taken = read(&path, &told, view.resolution).unwrap();
                     let off = taken.replicates[0].iter().zip(&image).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
                     assert!(off < 6e-3, "{off}");
-                    let told = Declared { encoding: Some(encoding), ..declared };
-                    assert!(!read_against(&path, &told, view.resolution, &reference).unwrap().undeclared);
+                    assert_eq!(evidence(&path, &told, view.resolution, &reference).unwrap(), None);
                 }
             }
         }

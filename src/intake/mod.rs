@@ -10,16 +10,20 @@ mod files;
 mod name;
 mod ratio;
 mod read;
+mod told;
 mod upsample;
 
 pub use curve::{Curve, fit_curve};
 pub use declared::{Declared, Means, Rows, Share, Upsample};
-pub use detect::read_against;
-pub use diagnose::{FACTORS, Finding, Reference, Scaled, Turn, alike, diagnose, frame_turn, is_rather};
+pub use detect::{Evidence, evidence};
+pub use diagnose::{
+    Disagreement, FACTORS, Finding, Reference, Scaled, Turn, agreement, alike, diagnose, frame_turn, is_rather,
+};
 pub use files::{Defaults, Files, Handed, HandedImage, files};
 pub use name::Shown;
 pub use ratio::{Frame, LONE_FRAME, Ratio, frame, ratio};
 pub use read::{Taken, check_numbers, read};
+pub use told::{Keys, examine};
 
 /// A scene of no suite, by whose picture a renderer shows that it holds its images the right
 /// way, saves them linear, and takes R in metres: a scene file. It has no occluder, is like none of its

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     disk::{DiskError, write_whole},
-    intake::{Finding, Reference, diagnose},
+    intake::{Declared, Finding, Keys, Reference, examine},
     layers::pixel_hash,
     metrics::regions::{Region, Regions},
     render::{
@@ -35,13 +35,13 @@ pub(super) struct Handed {
 
 /// What is wrong with images that commands left, held against the converged image of their
 /// method over the pixels that see a surface, and what is doubtful in the first of them. Codes are doubtful
-/// alone where it `is_declared` what numbers stand for.
+/// alone where it is `declared` what numbers stand for.
 pub(super) fn diagnosed(
     images: &[Vec<f32>],
     converged: &[f32],
     regions: &Regions,
     size: [u32; 2],
-    is_declared: bool,
+    declared: &Declared,
 ) -> [Vec<String>; 2] {
     let mut openness = vec![f32::NAN; converged.len()];
     for &i in regions.pixels(Region::All) {
@@ -50,12 +50,13 @@ pub(super) fn diagnosed(
     let reference = Reference { openness, scaled: Vec::new() };
     let (mut wrong, mut doubtful) = (Vec::new(), Vec::new());
     for (replicate, image) in images.iter().enumerate() {
-        for finding in diagnose(image, &reference, size.map(|side| side as usize)) {
-            let is_doubt = finding.is_doubt() || is_declared && matches!(finding, Finding::Encoded { .. });
-            if !is_doubt {
-                wrong.push(format!("replicate {replicate}: {finding}"));
+        for finding in examine(image, &reference, size.map(|side| side as usize), declared) {
+            let is_declared = declared.encoding.is_some() && matches!(finding, Finding::Encoded { .. });
+            let told = finding.told(declared, Keys::Suite);
+            if !finding.is_doubt() && !is_declared {
+                wrong.push(format!("replicate {replicate}: {told}"));
             } else if replicate == 0 {
-                doubtful.push(finding.to_string());
+                doubtful.push(told);
             }
         }
         if !wrong.is_empty() {

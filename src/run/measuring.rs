@@ -180,8 +180,8 @@ impl Subject<'_> {
         else {
             return Ok(Vec::new());
         };
-        let is_declared = by.external.image.encoding.is_some();
-        let [wrong, doubtful] = external::diagnosed(images, converged, regions, self.facts.resolution, is_declared);
+        let declared = &by.external.image;
+        let [wrong, doubtful] = external::diagnosed(images, converged, regions, self.facts.resolution, declared);
         if wrong.is_empty() { Ok(doubtful) } else { Err(format!("its images are wrong: {}", wrong.join("; and: "))) }
     }
 

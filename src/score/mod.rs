@@ -3,6 +3,7 @@
 //! renderer.
 
 mod declaration;
+mod encoding;
 mod reading;
 pub mod self_check;
 
@@ -15,6 +16,7 @@ use crate::{
     run::{CaseImages, References, ReferencesError},
     suite::{Case, is_taken},
 };
+use encoding::Encodings;
 use reading::Reader;
 use self_check::SCENE as SELF_CHECK;
 use std::{
@@ -40,6 +42,9 @@ pub enum ScoreError {
     /// The image of the self-check is wrong, so all are.
     #[error("the self-check image is wrong, and so will the others be: {0}")]
     SelfCheck(String),
+    /// The image of the self-check is not as expected, and no cause explains it.
+    #[error("the self-check does not agree, and neither may the others: {0}")]
+    Disagrees(String),
     /// There is no image of the kit's scenes.
     #[error("{0}")]
     Nothing(String),
@@ -83,7 +88,11 @@ pub fn gather(
     let mut warnings = found.warnings;
     // A curve that is found on the images later explains codes, too.
     let is_fitted = matches!(declaration.curve, Some(CurveChoice::Fit(_)));
-    let mut reader = Reader { folder, references, declared: declaration.of_images(), is_declared: is_fitted };
+    let declared = declaration.of_images();
+    let mut reader = Reader { folder, references, declared, encodings: Encodings::default(), is_declared: is_fitted };
+    let (encodings, taken) = Encodings::find(&reader, &found.cases, &|h| reader.expected(h))?;
+    reader.encodings = encodings;
+    warnings.extend(taken);
     let (checks, handed): (Vec<_>, Vec<_>) = found.cases.into_iter().partition(|c| c.scene == SELF_CHECK);
     let known = match &declaration.curve {
         Some(CurveChoice::Known(known)) => Some(known.curve()),

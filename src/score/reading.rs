@@ -1,9 +1,9 @@
 //! The images of one case, from its files.
 
-use super::ScoreError;
+use super::{ScoreError, encoding::Encodings, self_check};
 use crate::{
     disk::DiskError,
-    intake::{self, Declared, Finding, Handed, HandedImage, Reference, Shown},
+    intake::{self, Declared, Finding, Handed, HandedImage, IntakeError, Keys, Means, Reference, Shown},
     metrics::regions::Region,
     record::{Intervals, Shows, Source, told_once},
     run::{CaseImages, References},
@@ -16,6 +16,8 @@ pub(super) struct Reader<'a> {
     pub folder: &'a Path,
     pub references: &'a References,
     pub declared: Declared,
+    /// What was found of integers whose encoding is not declared.
+    pub encodings: Encodings,
     /// Whether codes that are not linear are meant to be so.
     pub is_declared: bool,
 }
@@ -100,7 +102,7 @@ impl Reader<'_> {
         let reference = self.reference(&handed.scene, &handed.estimator)?;
         let mut all = Read { images: Vec::new(), encoding: String::new(), warnings: Vec::new() };
         for image in &handed.images {
-            let read = self.image(image, view, &reference)?;
+            let read = self.image(image, &handed.estimator, view, &reference)?;
             all.images.extend(read.images);
             all.encoding = read.encoding;
             all.warnings.extend(read.warnings);
@@ -110,7 +112,13 @@ impl Reader<'_> {
 
     /// One file, or a pair. Every surface that the reference sees must have a number in whole frames; of
     /// openness the diagnosis tells.
-    pub fn image(&self, image: &HandedImage, view: [u32; 2], reference: &Reference) -> Result<Read, ScoreError> {
+    pub fn image(
+        &self,
+        image: &HandedImage,
+        estimator: &str,
+        view: [u32; 2],
+        reference: &Reference,
+    ) -> Result<Read, ScoreError> {
         let mut warnings = Vec::new();
         let mut warn = |path: &Path, text: String| warnings.push((path.to_owned(), text));
         let frame = |path: &Path| {
@@ -120,7 +128,8 @@ impl Reader<'_> {
         };
         let (images, encoding) = match (shows(Some(image.shown)), &image.without) {
             (Shows::Openness, _) => {
-                let taken = intake::read_against(&image.path, &self.declared, view, reference)?;
+                let encoding = self.declared.encoding.or_else(|| self.encodings.of(&image.path, estimator));
+                let taken = intake::read(&image.path, &Declared { encoding, ..self.declared.clone() }, view)?;
                 taken.warnings.into_iter().for_each(|w| warn(&image.path, w));
                 (taken.replicates, taken.encoding)
             }
@@ -128,6 +137,7 @@ impl Reader<'_> {
                 let (with, without) = (frame(&image.path)?, frame(beside)?);
                 let ratio = intake::ratio(&with, &without)?;
                 ratio.check_order(&image.path, beside)?;
+                check_different([&with.light, &without.light], reference)?;
                 with.warnings.iter().for_each(|w| warn(&image.path, w.clone()));
                 without.warnings.iter().for_each(|w| warn(beside, w.clone()));
                 ratio.remarks().into_iter().for_each(|w| warn(&image.path, w));
@@ -141,6 +151,15 @@ impl Reader<'_> {
             }
         };
         Ok(Read { images, encoding: encoding.label().to_owned(), warnings })
+    }
+
+    /// The size of the view and what images of a case look like; None where the kit has no such scene.
+    pub fn expected(&self, handed: &Handed) -> Result<Option<([u32; 2], Reference)>, DiskError> {
+        if handed.scene == self_check::SCENE {
+            return self_check::read(self.references).map(|(reference, view)| Some((view, reference)));
+        }
+        let Some(scene) = self.references.scene(&handed.scene) else { return Ok(None) };
+        Ok(Some((scene.facts.resolution, self.reference(&handed.scene, &handed.estimator)?)))
     }
 
     /// What images of an estimator look like, where the view sees a surface: its converged image, else that of
@@ -204,13 +223,19 @@ impl Reader<'_> {
     /// where it is declared what numbers stand for.
     pub fn of_openness(&self, image: &[f32], reference: &Reference, size: [usize; 2], shows: Shows) -> Diagnosis {
         let mut found = Diagnosis::default();
-        for finding in intake::diagnose(image, reference, size) {
-            let is_declared = matches!(finding, Finding::Encoded { .. }) && self.is_declared;
+        // Frames are no occlusion, whatever is declared of AO.
+        let means = if shows == Shows::Ratio { Means::Openness } else { self.declared.means };
+        let declared = Declared { means, ..self.declared.clone() };
+        for finding in intake::examine(image, reference, size, &declared) {
             if shows == Shows::Ratio && matches!(finding, Finding::Holes { .. }) {
                 continue;
             }
-            let to = if finding.is_doubt() || is_declared { &mut found.doubtful } else { &mut found.wrong };
-            to.push(finding.to_string());
+            // Where a frame is nearly dark, noise alone brings a ratio beyond its range.
+            let is_noise = shows == Shows::Ratio && matches!(finding, Finding::Range { scale: None, .. });
+            let is_declared = matches!(finding, Finding::Encoded { .. }) && self.is_declared;
+            let is_doubt = finding.is_doubt() || is_declared || is_noise;
+            let to = if is_doubt { &mut found.doubtful } else { &mut found.wrong };
+            to.push(finding.told(&declared, Keys::Score));
         }
         found
     }
@@ -233,6 +258,18 @@ impl Reader<'_> {
         }
         Ok(None)
     }
+}
+
+/// Refuses a frame with AO that is the one without, to the last bit, where there is AO to be seen.
+fn check_different([with, without]: [&[f32]; 2], reference: &Reference) -> Result<(), IntakeError> {
+    let is_closed = |v: &&f32| **v < 0.95;
+    let alike = with.iter().zip(without).all(|(a, b)| a == b || a.is_nan() && b.is_nan());
+    if alike && reference.openness.iter().any(|v| is_closed(&v)) {
+        let why =
+            "the two are identical, to the last bit: save one of them with AO turned on, and one with it turned off";
+        return Err(IntakeError::Ratio(why.to_owned()));
+    }
+    Ok(())
 }
 
 /// What is wrong with a whole frame: that it holds nothing, and, where that is plain, that it lies otherwise.

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     disk::DiskError,
-    intake::{Curve, Handed, Reference, Scaled},
+    intake::{self, Curve, Handed, HandedImage, Reference, Scaled},
     record::Shows,
     run::References,
 };
@@ -24,7 +24,7 @@ pub const OPENNESS: &str = "openness";
 pub const SCALED: &str = "scaled-";
 
 /// Reads the references.
-fn read(references: &References) -> Result<(Reference, [u32; 2]), DiskError> {
+pub(super) fn read(references: &References) -> Result<(Reference, [u32; 2]), DiskError> {
     let (path, layers) = references.beside(FILE)?;
     let openness = layers.get(OPENNESS).map(<[f32]>::to_vec);
     let openness = openness.ok_or_else(|| DiskError::content(&path, format!("it lacks '{OPENNESS}'")))?;
@@ -38,7 +38,7 @@ fn read(references: &References) -> Result<(Reference, [u32; 2]), DiskError> {
 /// Looks at the images of the self-check, with a curve undone that is declared. Returns what is doubtful.
 ///
 /// # Errors
-/// [`ScoreError::SelfCheck`] where one is wrong.
+/// [`ScoreError::SelfCheck`] where one is wrong, [`ScoreError::Disagrees`] where nobody knows why.
 pub(super) fn check(reader: &Reader<'_>, curve: Option<Curve>, handed: &[Handed]) -> Result<Vec<String>, ScoreError> {
     if handed.is_empty() {
         return Ok(vec![format!(
@@ -49,29 +49,40 @@ pub(super) fn check(reader: &Reader<'_>, curve: Option<Curve>, handed: &[Handed]
     let (reference, resolution) = read(reader.references)?;
     let size = resolution.map(|side| side as usize);
     let mut warnings = Vec::new();
-    for image in handed.iter().flat_map(|h| &h.images) {
-        let wrong = |why: String| {
-            let name = image.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-            ScoreError::SelfCheck(format!("{name}: {why}"))
-        };
-        let read = reader.image(image, resolution, &reference).map_err(|e| match e {
+    let suite = reader.references.suite();
+    let classic = &suite.methods[suite.classic()].name;
+    for (of, image) in handed.iter().flat_map(|h| h.images.iter().map(move |i| (&h.estimator, i))) {
+        let wrong = |why: String| ScoreError::SelfCheck(format!("{}: {why}", name_of(image)));
+        let read = reader.image(image, of, resolution, &reference).map_err(|e| match e {
             ScoreError::Intake(e) => ScoreError::SelfCheck(e.to_string()),
             other => other,
         })?;
         warnings.extend(read.warnings);
         let shows = shows(Some(image.shown));
         for values in &read.images {
-            let found = match (shows, curve) {
-                (Shows::Frame, _) => of_frame(values, &reference, None, size),
-                (_, Some(curve)) => reader.of_openness(&curve.undo(values), &reference, size, shows),
-                (_, None) => reader.of_openness(values, &reference, size, shows),
+            let plain = curve.filter(|_| shows != Shows::Frame).map(|curve| curve.undo(values));
+            let values = plain.as_ref().unwrap_or(values);
+            let found = match shows {
+                Shows::Frame => of_frame(values, &reference, None, size),
+                _ => reader.of_openness(values, &reference, size, shows),
             };
             if !found.wrong.is_empty() {
                 return Err(wrong(found.wrong.join("; and: ")));
+            }
+            // What is expected is classic AO; a curve that is yet to be fitted is no disagreement.
+            if shows != Shows::Frame && of == classic && !reader.is_declared {
+                let known = intake::examine(values, &reference, size, &reader.declared);
+                if let Some(apart) = intake::agreement(values, &reference, size, &known) {
+                    return Err(ScoreError::Disagrees(format!("{}: {apart}", name_of(image))));
+                }
             }
             warnings.extend(found.doubtful.into_iter().map(|w| (image.path.clone(), w)));
         }
     }
     let images = handed.iter().map(|h| h.images.len()).sum();
     Ok(reader.told(&warnings, images).into_iter().map(|w| format!("{SCENE}: {w}")).collect())
+}
+
+fn name_of(image: &HandedImage) -> String {
+    image.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
 }

@@ -374,7 +374,10 @@ mod scripts {
         let (code, record) = run(at, &suite, "--report markdown,html");
         assert_eq!(code, Some(5), "{record}");
         for (renderer, says) in [
-            ("inverted", "its images are wrong: replicate 0: inverted: 1 is closed; declare `means = \"occlusion\"`"),
+            (
+                "inverted",
+                "its images are wrong: replicate 0: inverted: 1 is closed; declare `image.means = \"occlusion\"`",
+            ),
             ("mirrored", "flipped in x"),
             ("codes", "divide by 255"),
         ] {
@@ -449,6 +452,10 @@ mod scripts {
         for (inherit, secret) in [(true, "told"), (false, "")] {
             let ended = command(at, &own(inherit), "--fresh").env("SECRET", "told").output().unwrap();
             assert_eq!(ended.status.code(), Some(0), "{}", record(at, &ended));
+            // Its values may be secrets, and what is logged may be pasted.
+            let log = fs::read_to_string(at.join("out/logs/plane/classic.odd.4.log")).unwrap();
+            assert!(log.contains("with HERE=… PLAIN=… (values are not logged)") && !log.contains("{3}"), "{log}");
+            assert!(log.contains(r"'$(touch pwned); touch pwned | '\''x'\'' "), "{log}");
             let env = fs::read_to_string(at.join("env.txt")).unwrap();
             assert_eq!(env, format!("{secret}|{{3}}\n"));
         }

@@ -284,6 +284,85 @@ fn a_scaled_scene_is_told() {
     assert!(code == 2 && text.contains("scaled scene") && text.contains("1/10"), "{code}: {text}");
 }
 
+/// A factor that nobody mistakes is told as it is, or that there is one; strength is no such thing.
+#[test]
+fn another_radius_does_not_agree() {
+    let images = Images::new();
+    images.all(|_, image, _| image.to_vec());
+    let scene = world().join("kit/scenes/self-check/self-check.toml").display().to_string();
+    let out = images.folder.path().join("self-check.classic.16.exr").display().to_string();
+    for (radius, factor) in [("0.65", 1.3), ("0.75", 1.5), ("0.35", 0.7), ("2.5", 5.0)] {
+        ok(&[
+            "render",
+            &scene,
+            "--rays",
+            "16",
+            "--replicates",
+            "2",
+            "--set",
+            &format!("radius={radius}"),
+            "--out",
+            &out,
+        ]);
+        let (code, text) = images.score(&[]);
+        assert!(code == 2 || code == 5, "{radius}: {code}: {text}");
+        let told = text.split(" times what was asked for").next().unwrap().rsplit(' ').next().unwrap();
+        let told = match told.split_once('/') {
+            Some((_, below)) => 1.0 / below.parse::<f64>().unwrap_or(f64::NAN),
+            None => told.parse().unwrap_or(f64::NAN),
+        };
+        assert!((told / factor - 1.0).abs() < 0.15, "{radius}: {told}: {text}");
+    }
+    images.self_check(|image, _| image.iter().map(|v| 1.0 - 0.7 * (1.0 - v)).collect());
+    let (code, text) = images.score(&[]);
+    assert!(code == 0 && text.contains("AO of strength 0.7"), "{code}: {text}");
+}
+
+/// What is declared and is wrong is not told to be declared.
+#[test]
+fn what_is_wrongly_declared_is_named() {
+    for (options, says) in [
+        (
+            ["--means", "occlusion"],
+            "declared as occlusion, but it looks like openness: take `means = \"occlusion\"` away",
+        ),
+        (["--rows", "bottom"], "looks like the top of the view: take `rows = \"bottom\"` away"),
+        (["--encoding", "srgb"], "declared as sRGB codes, but its numbers are linear: take `encoding = \"srgb\"` away"),
+    ] {
+        let images = Images::new();
+        images.all(|_, image, _| image.to_vec());
+        let (code, text) = images.score(&options);
+        assert!(code == 5 && text.contains(says), "{options:?}: {code}: {text}");
+        images.self_check(|image, _| image.to_vec());
+        let (code, text) = images.score(&options);
+        assert!(code == 2 && text.contains(says), "{options:?}: {code}: {text}");
+    }
+}
+
+/// All files of a method have one encoding, whatever a single one of them looks like.
+#[test]
+fn the_encoding_is_that_of_the_folder() {
+    for is_srgb in [true, false] {
+        let images = Images::new();
+        let mut read_as = Vec::new();
+        for scene in ["curtain-arcade", "corner"] {
+            let (replicates, [w, h]) = Images::of(scene, "classic");
+            for (r, image) in replicates.iter().enumerate() {
+                let code = |v: f32| if is_srgb { aogauge::layers::srgb(v) } else { (v * 255.0).round() as u8 };
+                let at = |x: u32, y: u32| image::Luma([code(image[(y * w + x) as usize])]);
+                let path = images.folder.path().join(format!("{scene}.classic.4.{r:04}.png"));
+                image::ImageBuffer::from_fn(w, h, at).save(path).unwrap();
+            }
+        }
+        images.score(&[]);
+        for own in &images.record().cases {
+            read_as.push(own.source.as_ref().unwrap().read_as.clone());
+        }
+        let word = if is_srgb { "srgb" } else { "linear" };
+        assert!(read_as.len() >= 2 && read_as.iter().all(|r| r.contains(word)), "{word}: {read_as:?}");
+    }
+}
+
 /// One wrong case ends that case alone, with its reason in the record.
 #[test]
 fn what_is_wrong_with_a_case_is_named() {
@@ -306,6 +385,12 @@ fn what_is_wrong_with_a_case_is_named() {
     let last = "corner.classic.4.0003.exr";
     check("image 3: inverted", &|images| images.exr(last, &first.iter().map(|v| 1.0 - v).collect::<Vec<_>>(), size));
     check("constant: 1 everywhere", &|images| images.exr(name, &vec![1.0; first.len()], size));
+    check("the farthest at column 3, row 1", &|images| {
+        let mut far = first.clone();
+        far[size[0] as usize + 3] = 1e6;
+        images.exr(name, &far, size);
+    });
+    check("black", &|images| images.exr(name, &vec![0.0; first.len()], size));
     check("infinity", &|images| {
         let mut hole = first.clone();
         hole[size[0] as usize + 3] = f32::INFINITY;
@@ -517,8 +602,9 @@ fn mirrored(image: &[f32], width: u32) -> Vec<f32> {
 #[test]
 fn what_is_wrong_with_whole_frames_is_named() {
     type Change = fn([Vec<f32>; 2], [u32; 2]) -> [Vec<f32>; 2];
-    let cases: [(Change, &str); 4] = [
+    let cases: [(Change, &str); 5] = [
         (|[with, without], _| [without, with], "are exchanged: "),
+        (|[with, _], _| [with.clone(), with], "the two are identical"),
         (|[a, b], [w, _]| [mirrored(&a, w), mirrored(&b, w)], "flipped in x"),
         (
             |[with, without], _| {
@@ -724,7 +810,7 @@ fn warnings_of_many_files_are_one_line() {
     }
     let (_, text) = images.score(&[]);
     let lines: Vec<&str> = text.lines().filter(|l| l.contains("no encoding is declared")).collect();
-    assert!(lines.len() <= 2 && lines[0].contains("(all 4 files)") && lines[0].ends_with("(all 2 cases)"), "{text}");
+    assert!(lines.len() == 1 && lines[0].contains(".png files of classic store integers: all are taken"), "{text}");
 }
 
 /// Notes stand on lines of their own.

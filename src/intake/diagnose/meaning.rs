@@ -2,13 +2,13 @@
 //! through a curve, or openness of another R.
 
 use super::{
-    Finding, Reference, Scaled,
+    Finding, Reference, Scaled, agreement,
     samples::{Samples, square},
 };
 use crate::{intake::Curve, layers::linear};
 
 /// Root mean square, noise taken away, from which on a difference is looked into.
-const DIFFERENT: f64 = 0.015;
+pub(super) const DIFFERENT: f64 = 0.015;
 /// What is left of the mean square difference under a hypothesis that is taken, a fifth as
 /// far. The right one leaves its noise; other estimators, held against classic AO, are
 /// nearer to classic AO of another R, or through a curve, but not so near.
@@ -22,7 +22,7 @@ const VARIED: f64 = 0.2;
 const CURVED: f64 = 1.25;
 const GAINED: f64 = 1.15;
 /// Standard errors between two hypotheses that are told from each other.
-const SURE: f64 = 4.0;
+pub(super) const SURE: f64 = 4.0;
 /// sRGB is near the power 1/2.2; powers in this range are an encoding for display.
 const DISPLAY: [f64; 2] = [1.0 / 2.7, 1.0 / 1.7];
 /// The reference must deviate by so much that a strength, one free number, can be told.
@@ -54,7 +54,8 @@ pub(super) fn find(image: &[f32], reference: &Reference, width: usize) -> Option
         return Some(blended.finding.clone());
     }
     Some(match best.finding {
-        Finding::Scaled { factors } => same_scales(image, reference, width, &factors),
+        Finding::Scaled { factors } => nearer_scale(image, reference, width, best.left)
+            .unwrap_or_else(|| same_scales(image, reference, width, &factors)),
         Finding::Encoded { gamma, .. } => {
             let alike = |h: &Hypothesis| h.left[0] - best.left[0] < SURE * h.left[1].hypot(best.left[1]);
             let strength = blended.filter(alike).and_then(|h| match h.finding {
@@ -159,6 +160,14 @@ fn scales<'a>(image: &'a [f32], reference: &'a Reference, width: usize) -> impl 
         finding: Finding::Scaled { factors: vec![*factor] },
         left: left(image, openness, width),
     })
+}
+
+/// A factor between those that are known, where an image is nearer to that by more than noise leaves: the
+/// remedy of the nearest known one would be wrong.
+fn nearer_scale(image: &[f32], reference: &Reference, width: usize, known: [f64; 2]) -> Option<Finding> {
+    let (factor, left) = agreement::factor(image, reference, width)?;
+    let is_nearer = known[0] - left[0] > SURE * known[1].hypot(left[1]);
+    is_nearer.then(|| Finding::Scaled { factors: vec![factor] })
 }
 
 /// All factors that the scene looks the same with as with the best of them, which comes first.

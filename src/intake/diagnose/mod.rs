@@ -5,6 +5,7 @@
 //! ([`meaning`]), and by how much it is shifted ([`shift`]). Margins are stated where they are used; all of them are measured
 //! against images of 4 rays and of 1 ray, and of other estimators.
 
+mod agreement;
 mod meaning;
 mod place;
 mod range;
@@ -13,6 +14,7 @@ mod shift;
 #[cfg(test)]
 mod tests;
 
+pub use agreement::{Disagreement, agreement};
 pub use place::{Turn, alike};
 
 use samples::Samples;
@@ -42,6 +44,9 @@ pub struct Scaled {
 /// for metres, a radius taken for a diameter, and the other way round.
 pub const FACTORS: [f64; 10] = [0.01, 1.0 / 39.37, 0.1, 1.0 / 3.28, 0.5, 2.0, 3.28, 10.0, 39.37, 100.0];
 
+/// Standard deviation from which on an image, and its reference, tell one encoding from another.
+const TELLING: f64 = 0.03;
+
 /// Something that is wrong with an image, by [`diagnose`].
 #[derive(Clone, Debug, PartialEq)]
 pub enum Finding {
@@ -69,6 +74,10 @@ pub enum Finding {
         most: f32,
         /// What they must be divided by; None where no usual scale explains them.
         scale: Option<f64>,
+        /// Pixels that are farther out of range than openness gets.
+        count: usize,
+        /// Column and row of the farthest.
+        farthest: [usize; 2],
     },
     /// Openness below 0.
     Negative {
@@ -97,6 +106,9 @@ pub enum Finding {
         /// What [`Finding::Strength`] would explain it as well, where the scene cannot tell them apart.
         strength: Option<f64>,
     },
+    /// Its numbers were linear before they were decoded as the sRGB codes that they were declared to be, by
+    /// [`super::examine`].
+    Decoded,
     /// AO was blended with white: 1 - `strength` * (1 - openness).
     Strength {
         /// 1 is as it should be.
@@ -148,6 +160,10 @@ pub fn diagnose(image: &[f32], reference: &Reference, size: [usize; 2]) -> Vec<F
         findings.push(Finding::Constant { value });
         return findings;
     }
+    if let Some(black) = black(image, &reference.openness) {
+        findings.push(black);
+        return findings;
+    }
     let ranged = range::find(image, &reference.openness, size[0]);
     let (ranged, image) = ranged.map_or((None, Cow::Borrowed(image)), |(f, i)| (Some(f), Cow::Owned(i)));
     findings.extend(ranged);
@@ -168,7 +184,9 @@ pub fn diagnose(image: &[f32], reference: &Reference, size: [usize; 2]) -> Vec<F
     let plain = meaning.as_ref().and_then(|m| meaning::undone(m, &upright)).unwrap_or(upright);
     let is_explained = meaning.is_some();
     findings.extend(meaning);
-    let like = reference.scaled.iter().find(|s| Some(s.factor) == factor).map_or(&reference.openness, |s| &s.openness);
+    let apart = |s: &Scaled| factor.map_or(f64::INFINITY, |f| (s.factor / f).ln().abs());
+    let nearest = reference.scaled.iter().min_by(|a, b| apart(a).total_cmp(&apart(b))).filter(|_| factor.is_some());
+    let like = nearest.map_or(&reference.openness, |s| &s.openness);
     let shifted = shift::find(&plain, like, size);
     let far = || if is_explained { None } else { shift::far(&plain, like, size) };
     findings.extend(shifted.or_else(far).map(|pixels| Finding::Shifted { pixels }));
@@ -196,11 +214,21 @@ pub(super) fn distance(image: &[f32], reference: &Reference, size: [usize; 2]) -
     meaning::left(&upright, &reference.openness, size[0])[0]
 }
 
-/// Whether an image can be compared with the reference at all: of its size, and not the same
-/// everywhere where it is not.
-pub(super) fn faults_aside(image: &[f32], reference: &Reference, size: [usize; 2]) -> bool {
+/// Whether an image tells what its numbers stand for: it and its reference vary.
+pub(super) fn is_telling(image: &[f32], reference: &Reference, size: [usize; 2]) -> bool {
     let whole = image.len() == reference.openness.len() && size[0].checked_mul(size[1]) == Some(image.len());
-    whole && Samples::new(image, &reference.openness).pairs() > 0
+    let both = Samples::new(image, &reference.openness);
+    // Of its own deviation.
+    let own = Samples::new(&reference.openness, image);
+    whole && both.pairs() > 0 && both.deviation() >= TELLING && own.deviation() >= TELLING
+}
+
+/// 0 to the last bit at every pixel of a scene that is nearly open everywhere. Openness that is drawn
+/// the wrong way round is so on an open plane alone, and the remedy names that, too.
+fn black(image: &[f32], reference: &[f32]) -> Option<Finding> {
+    let known = image.iter().zip(reference).filter(|(v, r)| v.is_finite() && r.is_finite());
+    let is_black = known.clone().all(|(v, _)| *v == 0.0) && known.clone().any(|(_, r)| *r > 0.05);
+    is_black.then_some(Finding::Constant { value: 0.0 })
 }
 
 fn holes(image: &[f32], reference: &[f32], width: usize) -> Option<Finding> {
@@ -226,13 +254,18 @@ impl Finding {
                 };
                 format!("{what}: {count} pixels that see a surface hold no number, the first at column {x}, row {y}")
             }
-            Finding::Range { least, most, .. } => {
-                format!("out of range: values run from {least:.3} to {most:.3}, where openness is 0 to 1")
+            Finding::Range { least, most, scale, count, farthest: [x, y] } => {
+                let at = match scale {
+                    Some(_) => String::new(),
+                    None => format!("; {count} pixels are far beyond, the farthest at column {x}, row {y}"),
+                };
+                format!("out of range: values run from {least:.3} to {most:.3}, where openness is 0 to 1{at}")
             }
             Finding::Negative { count, least, is_signed, .. } => {
                 let signed = if *is_signed { ", as if it ran from -1 to 1" } else { "" };
                 format!("negative openness: {count} pixels are below 0, the least is {least:.3}{signed}")
             }
+            Finding::Constant { value: 0.0 } => "black: 0 everywhere, as of a buffer that was cleared".to_owned(),
             Finding::Constant { value } => format!("constant: {value} everywhere"),
             Finding::Turned(turn) => turn.title().to_owned(),
             Finding::Inverted => "inverted: 1 is closed".to_owned(),
@@ -244,6 +277,7 @@ impl Finding {
                 });
                 format!("gamma-encoded: {how}{or}")
             }
+            Finding::Decoded => "decoded twice: declared as sRGB codes, but its numbers are linear".to_owned(),
             Finding::Strength { strength } => {
                 format!("AO of strength {strength:.2}: 1 - {strength:.2} times occlusion")
             }
@@ -265,7 +299,6 @@ impl Finding {
     pub fn is_doubt(&self) -> bool {
         match self {
             Finding::Curve { .. } | Finding::Strength { .. } | Finding::Shifted { .. } => true,
-            Finding::Range { scale, .. } => scale.is_none(),
             Finding::Negative { is_doubt, .. } => *is_doubt,
             _ => false,
         }
@@ -278,15 +311,21 @@ impl Finding {
             Finding::Holes { .. } => "look for a division by zero, or pixels that the AO pass leaves out".to_owned(),
             Finding::Range { scale: Some(scale), .. } => format!("divide by {scale}"),
             Finding::Range { scale: None, .. } => {
-                "save the AO buffer alone, before it meets light or exposure".to_owned()
+                "save the AO buffer alone, before it meets light or exposure, and look for a division by nearly zero"
+                    .to_owned()
             }
             Finding::Negative { is_signed: true, .. } => "save (v + 1) / 2".to_owned(),
             Finding::Negative { .. } => {
                 "save openness itself: a filter that sharpens, or an intensity above 1, leaves such values".to_owned()
             }
+            Finding::Constant { value: 0.0 } => {
+                "save the AO buffer itself, after it was drawn; if 1 is closed in it, declare `means = \"occlusion\"`"
+                    .to_owned()
+            }
             Finding::Constant { .. } => "save the AO buffer itself: this one was cleared and not drawn".to_owned(),
             Finding::Turned(turn) => turn.remedy().to_owned(),
             Finding::Inverted => "declare `means = \"occlusion\"`, or save 1 - occlusion".to_owned(),
+            Finding::Decoded => "declare `encoding = \"linear\"`".to_owned(),
             Finding::Strength { .. } => {
                 "set strength, intensity or opacity of the AO to 1, or save its buffer before it is blended".to_owned()
             }

@@ -22,17 +22,23 @@ const SIGNED: f64 = 4.0;
 pub(super) fn find(image: &[f32], reference: &[f32], width: usize) -> Option<(Finding, Vec<f32>)> {
     let seen = || image.iter().zip(reference).filter(|(v, r)| v.is_finite() && r.is_finite()).map(|(v, _)| *v);
     let (least, most) = seen().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, m), v| (l.min(v), m.max(v)));
-    // What was declared to be occlusion is 1 - v by now.
-    let closed = least < -1.0 - TOP && most <= TOP;
+    let all = seen().count().max(1) as f64;
+    // What was declared to be occlusion is 1 - v by now. A few pixels so far below are no scale.
+    let low = seen().filter(|v| *v < -TOP).count() as f64;
+    let closed = least < -1.0 - TOP && most <= TOP && low > FEW * all;
     let at = |scale: f64, v: f32| if closed { 1.0 - (1.0 - v) / scale as f32 } else { v / scale as f32 };
-    if most > TOP || closed {
+    if most > TOP || least < -1.0 - TOP {
+        let (count, farthest) = beyond(image, reference, width);
         let [least, most] = if closed { [1.0 - most, 1.0 - least] } else { [least, most] };
         let scale = scale(image, reference, width, f64::from(most), &at);
-        let undone = image.iter().map(|v| at(scale.unwrap_or(1.0), *v)).collect();
-        return Some((Finding::Range { least, most, scale }, undone));
+        // What else is wrong is told by the other pixels.
+        let is_kept = |v: f32| scale.is_some() || (-TOP..=TOP).contains(&v);
+        let undone = |v: &f32| if is_kept(*v) { at(scale.unwrap_or(1.0), *v) } else { f32::NAN };
+        let undone = image.iter().map(undone).collect();
+        return Some((Finding::Range { least, most, scale, count, farthest }, undone));
     }
-    let (below, all) = (seen().filter(|v| *v < BELOW).count(), seen().count());
-    let share = below as f64 / all.max(1) as f64;
+    let below = seen().filter(|v| *v < BELOW).count();
+    let share = below as f64 / all;
     if share <= FEW {
         return None;
     }
@@ -41,6 +47,19 @@ pub(super) fn find(image: &[f32], reference: &[f32], width: usize) -> Option<(Fi
     let is_signed = least >= -1.0 + BELOW && SIGNED * far(&unsigned) < far(image);
     let finding = Finding::Negative { count: below, least, is_signed, is_doubt: share < MANY && !is_signed };
     Some((finding, if is_signed { unsigned } else { image.to_vec() }))
+}
+
+/// How many pixels that see a surface are beyond what openness gets to, and where the farthest is.
+fn beyond(image: &[f32], reference: &[f32], width: usize) -> (usize, [usize; 2]) {
+    let seen = image.iter().zip(reference).enumerate().filter(|(_, (v, r))| v.is_finite() && r.is_finite());
+    let beyond = seen.map(|(i, (v, _))| (i, v.abs())).filter(|(_, far)| *far > TOP);
+    let (count, at, _) = beyond.fold(
+        (0, 0, 0.0),
+        |(n, at, most), (i, far)| {
+            if far > most { (n + 1, i, far) } else { (n + 1, at, most) }
+        },
+    );
+    (count, [at % width.max(1), at / width.max(1)])
 }
 
 /// The scale at which an image is nearest to its reference or to what it would be inverted, where

@@ -141,7 +141,10 @@ fn inverted_images_are_told() {
     for bench in [&*SELF, &Bench::library("corner"), &flat] {
         for rays in NOISES {
             let image: Vec<f32> = bench.classic(rays).iter().map(|v| 1.0 - v).collect();
-            assert_eq!(bench.diagnose(&image), [Finding::Inverted], "{}, {rays} rays", bench.scene.name);
+            // Of an open plane it is black, as a cleared buffer is.
+            let is_black = image.iter().all(|v| *v == 0.0);
+            let expected = if is_black { Finding::Constant { value: 0.0 } } else { Finding::Inverted };
+            assert_eq!(bench.diagnose(&image), [expected], "{}, {rays} rays", bench.scene.name);
         }
     }
 }
@@ -397,4 +400,21 @@ fn how_a_frame_lies_is_told_where_it_is_plain() {
     }
     let lamp: Vec<f32> = (0..SELF.reference.openness.len()).map(|i| (i % 160) as f32).collect();
     assert_eq!(frame_turn(&lamp, &[&SELF.reference.openness], SELF.size), None);
+}
+
+/// One pixel that a division left is named, and says nothing of the rest.
+#[test]
+fn outliers_and_black_images_are_told() {
+    for value in [1e6, -1e6] {
+        let mut image = SELF.classic(64);
+        image[2 * SELF.size[0] + 5] = value;
+        let found = SELF.diagnose(&image);
+        let is = matches!(found[..], [Finding::Range { scale: None, count: 1, farthest: [5, 2], .. }]);
+        assert!(is && !found[0].is_doubt(), "{value}: {found:?}");
+        assert!(found[0].to_string().contains("1 pixels are far beyond, the farthest at column 5, row 2"));
+    }
+    let open = Reference { openness: vec![1.0; 12], scaled: Vec::new() };
+    let found = diagnose(&[0.0; 12], &open, [4, 3]);
+    assert_eq!(found, [Finding::Constant { value: 0.0 }]);
+    assert!(found[0].to_string().starts_with("black: "), "{}", found[0]);
 }

@@ -5,6 +5,7 @@
 //! at the one place that was named.
 
 mod capture;
+mod logged;
 mod output;
 mod process;
 mod template;
@@ -15,7 +16,7 @@ pub(crate) use template::{Slot, Template};
 
 use crate::{
     disk::DiskError,
-    intake::Declared,
+    intake::{Declared, Keys},
     layers::hex,
     untrusted::{cut, line},
 };
@@ -225,7 +226,7 @@ impl Ready<'_> {
         log: &mut Capped,
     ) -> Result<Option<(Vec<f32>, f64)>, ExternalError> {
         let mut command = self.command(shot, attempt);
-        log.push(format!("{command:?}\nin {}\n", self.external.folder.display()).as_bytes());
+        log.push(logged::written(&command, self.external, &self.program).as_bytes());
         let ran = process::run(&mut command, self.external.timeout, go_on).map_err(ExternalError::Start)?;
         for (name, said) in [("stdout", &ran.stdout), ("stderr", &ran.stderr)] {
             if !said.is_empty() {
@@ -264,7 +265,7 @@ impl Ready<'_> {
         }
         let Some(path) = attempt.taken()? else { return Err(ExternalError::NoOutput { last: last(ran) }) };
         let taken = crate::intake::read(&path, &self.external.image, shot.resolution)
-            .map_err(|e| ExternalError::Image(e.to_string()))?;
+            .map_err(|e| ExternalError::Image(e.of(Keys::Suite)))?;
         for warning in &taken.warnings {
             log.push(format!("warning: {warning}\n").as_bytes());
         }

@@ -38,6 +38,15 @@ impl Slot {
         (Slot::SuiteFolder, "suite_folder"),
     ];
 
+    /// Whether it is filled in with a path that aogauge chose.
+    fn is_path(self) -> bool {
+        matches!(self, Slot::Scene | Slot::SceneToml | Slot::View | Slot::Output)
+    }
+
+    fn name(self) -> &'static str {
+        Self::ALL.iter().find(|(slot, _)| *slot == self).map_or("", |(_, name)| name)
+    }
+
     fn named(name: &str) -> Option<Slot> {
         Self::ALL.iter().find(|(_, n)| *n == name).map(|(slot, _)| *slot)
     }
@@ -96,7 +105,29 @@ impl Template {
         if !plain.is_empty() {
             pieces.push(Piece::Text(plain));
         }
-        Ok(Template(pieces))
+        let template = Template(pieces);
+        match template.climbs() {
+            Some(slot) => Err(format!(
+                "'{}' leads out of {{{}}} by '..': a command may be told the path, and no other one from there",
+                text.escape_debug(),
+                slot.name()
+            )),
+            None => Ok(template),
+        }
+    }
+
+    /// The path of ours that a component `..` follows, if one does: it leads to folders of the run, which are
+    /// removed with all that is in them.
+    fn climbs(&self) -> Option<Slot> {
+        let mut path = None;
+        for piece in &self.0 {
+            match piece {
+                Piece::Slot(slot) => path = if slot.is_path() { Some(*slot) } else { path },
+                Piece::Text(text) if path.is_some() && text.split(['/', '\\']).any(|part| part == "..") => return path,
+                Piece::Text(_) => {}
+            }
+        }
+        None
     }
 
     /// Whether a slot is in it.
@@ -146,6 +177,9 @@ mod tests {
             ("{width}x{height}", "<Width {rays}>x<Height {rays}>"),
             ("{{\"rays\": {rays}}}", "{\"rays\": <Rays {rays}>}"),
             ("{{rays}}", "{rays}"),
+            ("../a/{rays}..", "../a/<Rays {rays}>.."),
+            ("{suite_folder}/../x", "<SuiteFolder {rays}>/../x"),
+            ("{output}..png", "<Output {rays}>..png"),
             ("ü{{", "ü{"),
             ("$(x) ; 'y' \"z\"", "$(x) ; 'y' \"z\""),
         ] {
@@ -166,6 +200,8 @@ mod tests {
             ("rays}", "has a single '}'"),
             ("{ra{{ys}", "has a single '{'"),
             ("a\0b", "zero byte"),
+            ("{output}/../..", "leads out of {output} by '..'"),
+            ("--o={scene}\\..\\x", "leads out of {scene} by '..'"),
         ] {
             let why = Template::parse(text).unwrap_err();
             assert!(why.contains(says), "{text}: {why}");

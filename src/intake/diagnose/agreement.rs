@@ -1,0 +1,91 @@
+//! Whether an image agrees with its reference as a whole, and with which R it would.
+
+use super::{
+    Finding, Reference,
+    meaning::{DIFFERENT, SURE, left, undone},
+};
+use std::fmt;
+
+/// Sides of the blocks that are compared by their means: antialiasing and noise hardly move these.
+const BLOCK: usize = 8;
+/// Steps that R is looked for in between two of the reference.
+const STEPS: u32 = 12;
+/// What is left of the mean square difference with another R that is named.
+const NAMED: f64 = 0.25;
+
+/// By how much an image does not agree with its reference.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Disagreement {
+    /// Root mean square of the differences of blocks, without noise.
+    pub rms: f64,
+    /// Mean of the differences.
+    pub mean: f64,
+    /// About how many times R is what was asked for, where that brings the image near.
+    pub factor: Option<f64>,
+}
+
+impl fmt::Display for Disagreement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Disagreement { rms, mean, factor } = self;
+        write!(
+            f,
+            "it does not agree with what is expected: mean difference {mean:+.4}, root mean square {rms:.4} over blocks of \
+             {BLOCK} x {BLOCK} pixels; R or scale may be off"
+        )?;
+        factor.map_or(Ok(()), |factor| write!(f, ": R looks like {factor:.2} times what was asked for"))
+    }
+}
+
+/// Whether an image differs from its reference by more than noise leaves, once what was found is undone. One that
+/// is shifted cannot be told.
+pub fn agreement(image: &[f32], reference: &Reference, size: [usize; 2], found: &[Finding]) -> Option<Disagreement> {
+    let is_other = image.len() != reference.openness.len() || size[0] == 0;
+    if is_other || found.iter().any(|f| matches!(f, Finding::Shifted { .. })) {
+        return None;
+    }
+    let plain = found.iter().find_map(|f| undone(f, image));
+    let [rms, mean] = differs(plain.as_deref().unwrap_or(image), &reference.openness, size[0])?;
+    let without = left(image, &reference.openness, size[0])[0];
+    let factor = factor(image, reference, size[0]).filter(|(_, left)| left[0] < NAMED * without);
+    Some(Disagreement { rms, mean, factor: factor.map(|(factor, _)| factor) })
+}
+
+/// Root mean square, without noise, and mean of the differences of blocks, where they are worth an explanation.
+fn differs(image: &[f32], reference: &[f32], width: usize) -> Option<[f64; 2]> {
+    let across = width.div_ceil(BLOCK);
+    let mut blocks = vec![[0.0f64; 3]; across * (image.len() / width).div_ceil(BLOCK)];
+    for (i, (a, b)) in image.iter().zip(reference).enumerate() {
+        let d = f64::from(a - b);
+        if d.is_finite() {
+            let [n, sum, squares] = &mut blocks[i / width / BLOCK * across + i % width / BLOCK];
+            (*n, *sum, *squares) = (*n + 1.0, *sum + d, *squares + d * d);
+        }
+    }
+    let (mut count, mut signal, mut error, mut mean) = (0.0, 0.0, 0.0, 0.0);
+    for [n, sum, squares] in blocks.into_iter().filter(|[n, ..]| *n >= (BLOCK * BLOCK / 2) as f64) {
+        let own = sum / n;
+        // Variance of the block's mean.
+        let noise = ((squares / n - own * own) / (n - 1.0)).max(0.0);
+        (count, mean) = (count + 1.0, mean + own);
+        (signal, error) = (signal + own * own - noise, error + 2.0 * noise * noise + 4.0 * own * own * noise);
+    }
+    let (signal, error) = (signal / count, error.sqrt() / count);
+    (signal > DIFFERENT * DIFFERENT + SURE * error).then(|| [signal.sqrt(), mean / count])
+}
+
+/// The factor of R by which an image is nearest to its reference, between those that are known, and the mean
+/// square that is left with its error.
+pub(super) fn factor(image: &[f32], reference: &Reference, width: usize) -> Option<(f64, [f64; 2])> {
+    let usable = reference.scaled.iter().filter(|s| s.openness.len() == image.len() && s.factor > 0.0);
+    let mut known: Vec<(f64, &[f32])> = usable.map(|s| (s.factor, s.openness.as_slice())).collect();
+    known.push((1.0, &reference.openness));
+    known.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let between =
+        known.windows(2).flat_map(|pair| (0..=STEPS).map(move |step| (pair, f64::from(step) / f64::from(STEPS))));
+    let tried = between.map(|(pair, t)| {
+        let [(low, a), (high, b)] = [pair[0], pair[1]];
+        let mixed: Vec<f32> = a.iter().zip(b).map(|(a, b)| a + (b - a) * t as f32).collect();
+        (low * (high / low).powf(t), left(image, &mixed, width))
+    });
+    tried.reduce(|a, b| if b.1[0] < a.1[0] { b } else { a })
+}
