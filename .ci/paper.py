@@ -37,8 +37,10 @@ def run(*args, allowed=(0,)):
 
 def records():
     """Both suites; a claim that is not decided is for the page to say."""
-    run("run", "paper", "--out", work / "paper", allowed=(0, 1, 6))
-    run("run", "reports/paper/sweep.toml", "--renderer", "cpu", "--out", work / "sweep")
+    if not (work / "paper/record.json").exists():
+        run("run", "paper", "--out", work / "paper", allowed=(0, 1, 6))
+    if not (work / "sweep/record.json").exists():
+        run("run", "reports/paper/sweep.toml", "--renderer", "cpu", "--out", work / "sweep")
     return [json.loads((work / name / "record.json").read_text()) for name in ("paper", "sweep")]
 
 
@@ -235,22 +237,24 @@ def fig5():
     shown = ["classic", "unity-medium", "unreal-default", "microsoft-sample", "paper-32", "path-traced"]
     titles = ["classic, R = 0.25 m", "Unity, medium", "Unreal, default", "Microsoft's sample", "the paper, 32 rays", "path traced"]
     scenes = ["curtain-arcade", "curtain-room"]
-    figure, axes = plt.subplots(2, 6, figsize=(14.5, 3.9))
-    for row, scene in zip(axes, scenes):
-        for axis, method, title in zip(row, shown, titles):
+    figure, axes = plt.subplots(4, 3, figsize=(10, 9.6))
+    for rows, scene in zip((axes[:2], axes[2:]), scenes):
+        for axis, method, title in zip(rows.flat, shown, titles):
             folder = work / "paper/pictures" / scene
             path = folder / "path-traced.png" if method == "path-traced" else folder / "look" / f"{method}.png"
             axis.imshow(plt.imread(path), interpolation="nearest", cmap="gray", vmin=0, vmax=1)
             plain(axis, "#cccccc", 1)
-            if scene == scenes[0]:
-                axis.set_title(title, fontsize=12)
-        row[0].set_ylabel(scene.removeprefix("curtain-"), fontsize=12)
+            axis.set_title(title, fontsize=13)
+        for row in rows:
+            row[0].set_ylabel(scene.removeprefix("curtain-"), fontsize=13)
     save(figure, "fig-5-engines.png")
 
 
 def fig6():
     scenes = [s for s in ("curtain-arcade", "curtain-room", "pillar", "curtain-open", "atrium") if has(paper, s)]
-    figure, axes = plt.subplots(1, len(scenes), figsize=(3.0 * len(scenes), 3.4), sharey=True)
+    figure, axes = plt.subplots(2, 3, figsize=(10, 6.6), sharey=True)
+    axes = axes.flat
+    axes[5].set_visible(False)
     for axis, scene in zip(axes, scenes):
         for label, colour, width in (("Q", BLACK, 2.0), ("classic", RED, 1.4), ("paper-32", BLUE, 1.4)):
             t, value = curve(paper, scene, label)
@@ -259,7 +263,8 @@ def fig6():
         axis.set_xlabel("t / R")
         axis.set_xlim(-1, 1)
         axis.set_ylim(0, 1.3)
-    axes[0].set_ylabel("openness O, occlusion ratio Q")
+    for axis in (axes[0], axes[3]):
+        axis.set_ylabel("openness O, occlusion ratio Q")
     handles = [Line2D([], [], color=c, lw=2, label=n) for c, n in ((BLACK, "Q, path traced"), (RED, "classic"), (BLUE, "the paper, 32 rays"))]
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     save(figure, "fig-6-path-traced.svg")

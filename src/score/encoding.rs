@@ -13,6 +13,9 @@ use std::{collections::BTreeMap, path::Path};
 #[derive(Default)]
 pub(super) struct Encodings(BTreeMap<(String, String), Encoding>);
 
+/// The size that an image should have and what it should show, where a kit tells.
+type Expected = Option<([u32; 2], Reference)>;
+
 /// The format of a file by its name.
 fn format(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
@@ -31,7 +34,7 @@ impl Encodings {
     pub fn find(
         reader: &Reader<'_>,
         handed: &[Handed],
-        view: &dyn Fn(&Handed) -> Result<Option<([u32; 2], Reference)>, DiskError>,
+        view: &dyn Fn(&Handed) -> Result<Expected, DiskError>,
     ) -> Result<(Self, Vec<String>), DiskError> {
         let (mut found, mut told) = (Encodings::default(), Vec::new());
         if reader.declared.encoding.is_some() {
