@@ -87,7 +87,6 @@ plt.rcParams.update({
     "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": "#e4e4e4",
     "axes.axisbelow": True, "legend.frameon": False, "figure.constrained_layout.use": True,
 })
-NAMES = {"classic": "classic", "paper-4": "the paper, 4 rays", "paper-32": "the paper, 32 rays", "clipped": "clipped"}
 
 
 def save(figure, name):
@@ -333,7 +332,8 @@ def noise_plot():
 
 # The sweep
 
-LENGTHS = [("1-8", 1 / 8), ("1-4", 1 / 4), ("3-8", 3 / 8), ("1-2", 1 / 2), ("3-4", 3 / 4), ("1", 1.0)]
+# R' by its name in the suite.
+LENGTHS = {"1-8": "R/8", "1-4": "R/4", "3-8": "3R/8", "1-2": "R/2", "3-4": "3R/4", "1": "R"}
 PLACES = [
     ("curtain-arcade", "arcade, albedo 0.6", BLUE, "o"), ("arcade-albedo-20", "arcade, albedo 0.2", "#56B4E9", "v"),
     ("arcade-albedo-80", "arcade, albedo 0.8", GREEN, "^"), ("curtain-room", "room, albedo 0.6", ORANGE, "s"),
@@ -341,22 +341,18 @@ PLACES = [
 ]
 
 
-def fractions(name):
-    return {"1-8": "R/8", "1-4": "R/4", "3-8": "3R/8", "1-2": "R/2", "3-4": "3R/4", "1": "R"}[name]
-
-
 def pareto():
     figure, axes = plt.subplots(1, 2, figsize=(11.5, 4.2), sharey=True)
     for axis, receiver in zip(axes, ("clipped", "counts")):
         axis.axhline(0, color=BLACK, lw=1)
         for scene, label, colour, marker in PLACES:
-            found = [(case(sweep, scene, f"{receiver}-{n}", "over-darkening"), case(sweep, scene, f"{receiver}-{n}", "contrast-error")) for n, _ in LENGTHS]
+            found = [(case(sweep, scene, f"{receiver}-{n}", "over-darkening"), case(sweep, scene, f"{receiver}-{n}", "contrast-error")) for n in LENGTHS]
             first = (0.0, case(sweep, scene, "classic", "contrast-error").value)
             x, y = zip(first, *((a.value, b.value) for a, b in found))
             axis.plot(x, y, marker=marker, color=colour, lw=1.2, ms=5, label=label)
             if scene == "curtain-arcade":
-                for (n, _), a, b in zip(LENGTHS, x[1:], y[1:]):
-                    axis.annotate(fractions(n), (a, b), xytext=(3, -13), textcoords="offset points", fontsize=9, color=colour)
+                for length, a, b in zip(LENGTHS.values(), x[1:], y[1:]):
+                    axis.annotate(length, (a, b), xytext=(3, -13), textcoords="offset points", fontsize=9, color=colour)
         axis.set_title({"clipped": "secondary rays end at the receiver's plane", "counts": "the receiver closes secondary rays (the paper, literally)"}[receiver], fontsize=11)
         axis.set_xlabel("darkening: mean of O(classic) − O over the view")
     axes[0].set_ylabel("contrast error dK")
@@ -368,7 +364,7 @@ def pareto():
 def front():
     """The table of R' over scenes: dK, and what is taken away."""
     lines = ["| R' | " + " | ".join(label for _, label, _, _ in PLACES) + " | darkening, arcade |", "|--|" + "--:|" * (len(PLACES) + 1)]
-    rows = [("classic", "classic")] + [(f"clipped-{n}", fractions(n)) for n, _ in LENGTHS]
+    rows = [("classic", "classic")] + [(f"clipped-{n}", length) for n, length in LENGTHS.items()]
     for estimator, label in rows:
         values = [str(case(sweep, s, estimator, "contrast-error")) for s, _, _, _ in PLACES]
         dark = case(sweep, "curtain-arcade", estimator, "over-darkening")
@@ -382,7 +378,7 @@ def height():
     for name, ratio, colour in (("1-4", 0.25, BLUE), ("3-8", 0.375, GREEN), ("1-2", 0.5, ORANGE)):
         reach = math.sqrt(0.25 + ratio**2)
         values = [case(sweep, s, f"clipped-{name}", "removed") for s, _ in gaps]
-        axis.errorbar([m / 0.25 for _, m in gaps], [v.value for v in values], yerr=[v.half for v in values], fmt="o", color=colour, ms=5, lw=1.3, label=f"R' = {fractions(name)}: reach {reach:.2f} R")
+        axis.errorbar([m / 0.25 for _, m in gaps], [v.value for v in values], yerr=[v.half for v in values], fmt="o", color=colour, ms=5, lw=1.3, label=f"R' = {LENGTHS[name]}: reach {reach:.2f} R")
         axis.axvline(reach, color=colour, lw=1, ls="--")
     axis.axhline(0, color=BLACK, lw=1)
     axis.set_xlabel("height of the hem over the ground, m / R")

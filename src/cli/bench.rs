@@ -10,7 +10,10 @@ use crate::{
     report::bench as tables,
     run::Observer,
 };
-use std::{io::Write, path::PathBuf};
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+};
 
 /// Measure how fast AO is, and how fast rays are.
 #[derive(Debug, clap::Subcommand)]
@@ -112,16 +115,18 @@ fn gpu(args: &GpuArgs) -> Result<Exit, Failure> {
         }
     }
     drop(bar);
-    if let Some(folder) = &args.out {
-        for (name, text) in [("bench.json", json(&bench)?), ("bench.md", tables::markdown(&bench))] {
+    hand_out(args.out.as_deref(), args.format, &json(&bench)?, [tables::markdown(&bench), tables::plain(&bench)])?;
+    failed.map_or(Ok(Exit::Pass), Err)
+}
+
+/// Writes what was measured to a folder, where one is given, and prints it; of texts the page's, then the terminal's.
+fn hand_out(folder: Option<&Path>, format: Format, json: &str, [page, plain]: [String; 2]) -> Result<(), Failure> {
+    if let Some(folder) = folder {
+        for (name, text) in [("bench.json", json), ("bench.md", &page)] {
             let path = folder.join(name);
             write_whole(&path, |buffer| buffer.write_all(text.as_bytes()))?;
             tell(&path.display().to_string());
         }
     }
-    match args.format {
-        Format::Json => print(&json(&bench)?)?,
-        Format::Text => print(&tables::plain(&bench))?,
-    }
-    failed.map_or(Ok(Exit::Pass), Err)
+    print(if format == Format::Json { json } else { &plain })
 }

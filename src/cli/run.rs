@@ -295,11 +295,11 @@ const MOST_ENDED: usize = 12;
 
 /// Says which cases ended with an error. Where the run ended early, that says why.
 fn tell_ended(record: &Record) {
-    let ended: Vec<String> =
-        record.cases.iter().filter_map(|c| Some(format!("{}: {}", c.case.id(), c.error.as_ref()?))).collect();
     if record.incomplete.is_some() {
         return;
     }
+    let ended: Vec<String> =
+        record.cases.iter().filter_map(|c| Some(format!("{}: {}", c.case.id(), c.error.as_ref()?))).collect();
     for why in ended.iter().take(MOST_ENDED) {
         tell(&format!("aogauge: {why}"));
     }

@@ -84,6 +84,16 @@ impl Means {
     }
 }
 
+impl Means {
+    /// Applies a curve to what a file stores, given as openness: occlusion is 1 less that.
+    pub(super) fn through(self, openness: f32, curve: impl Fn(f32) -> f32) -> f32 {
+        match self {
+            Means::Openness => curve(openness),
+            Means::Occlusion => 1.0 - curve(1.0 - openness),
+        }
+    }
+}
+
 impl Rows {
     /// As it is written in `score.toml`.
     pub fn label(self) -> &'static str {

@@ -1,7 +1,7 @@
 //! Which encoding images have whose maker did not say.
 
 use super::{
-    Declared, IntakeError, Means, Reference,
+    Declared, IntakeError, Reference,
     diagnose::{distance, is_telling},
     read,
 };
@@ -57,9 +57,8 @@ pub fn evidence(
     }
     let size = view.map(|side| side as usize);
     let telling = taken.replicates.iter().filter(|i| is_telling(i, reference, size));
-    let decoded = |v: &f32| if declared.means == Means::Occlusion { 1.0 - linear(1.0 - v) } else { linear(*v) };
     let of = |image: &Vec<f32>| {
-        let codes: Vec<f32> = image.iter().map(decoded).collect();
+        let codes: Vec<f32> = image.iter().map(|v| declared.means.through(*v, linear)).collect();
         let far = |image: &[f32]| distance(image, reference, size).max(0.0);
         Evidence { linear: far(image), srgb: far(&codes), images: 1 }
     };
@@ -70,6 +69,7 @@ pub fn evidence(
 mod tests {
     use super::*;
     use crate::{
+        intake::Means,
         render::{Estimator, Geometry, Job, Renderer, cpu::Cpu},
         scenes::library,
     };

@@ -52,8 +52,7 @@ pub fn examine(image: &[f32], reference: &Reference, size: [usize; 2], declared:
     if declared.encoding != Some(Encoding::Srgb) || !found.iter().any(is_meaning) {
         return found;
     }
-    let stored = |v: &f32| if declared.means == Means::Occlusion { 1.0 - code(1.0 - v) } else { code(*v) };
-    let stored: Vec<f32> = image.iter().map(stored).collect();
+    let stored: Vec<f32> = image.iter().map(|v| declared.means.through(*v, code)).collect();
     let is_linear = !diagnose(&stored, reference, size).iter().any(is_meaning)
         && distance(&stored, reference, size) < NEARER * distance(image, reference, size);
     if is_linear {

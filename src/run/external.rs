@@ -9,7 +9,7 @@ use crate::{
     disk::{DiskError, write_whole},
     intake::{Declared, Finding, Keys, Reference, examine},
     layers::pixel_hash,
-    metrics::regions::{Region, Regions},
+    metrics::regions::Regions,
     render::{
         Estimator,
         external::{Attempt, Capped, ExternalError, Ready, Shot},
@@ -43,11 +43,7 @@ pub(super) fn diagnosed(
     size: [u32; 2],
     declared: &Declared,
 ) -> [Vec<String>; 2] {
-    let mut openness = vec![f32::NAN; converged.len()];
-    for &i in regions.pixels(Region::All) {
-        openness[i as usize] = converged[i as usize];
-    }
-    let reference = Reference { openness, scaled: Vec::new() };
+    let reference = Reference::over(converged, regions);
     let (mut wrong, mut doubtful) = (Vec::new(), Vec::new());
     for (replicate, image) in images.iter().enumerate() {
         for finding in examine(image, &reference, size.map(|side| side as usize), declared) {

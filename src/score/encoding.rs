@@ -1,10 +1,10 @@
 //! Which encoding the integers of a folder have, where it is not declared: one answer for all images of a
 //! format and a method.
 
-use super::reading::Reader;
+use super::reading::{Expected, Reader};
 use crate::{
     disk::DiskError,
-    intake::{self, Evidence, Handed, HandedImage, Reference, Shown},
+    intake::{self, Evidence, Handed, HandedImage, Shown},
     metrics::image::Encoding,
 };
 use std::{collections::BTreeMap, path::Path};
@@ -12,9 +12,6 @@ use std::{collections::BTreeMap, path::Path};
 /// The encodings that were found, by format and estimator.
 #[derive(Default)]
 pub(super) struct Encodings(BTreeMap<(String, String), Encoding>);
-
-/// The size that an image should have and what it should show, where a kit tells.
-type Expected = Option<([u32; 2], Reference)>;
 
 /// The format of a file by its name.
 fn format(path: &Path) -> String {

@@ -191,11 +191,13 @@ fn lines(what: String, more: &[String]) -> String {
 /// Cases of a ray count that less than half as many scenes have as another one of the same
 /// estimator: a slip in a name more likely than a plan, of which no other scene's images are missed.
 fn strays(handed: &[Handed]) -> Vec<&Handed> {
-    let scenes =
-        |estimator: &str, rays: u32| handed.iter().filter(|h| h.estimator == estimator && h.rays == rays).count();
+    let mut scenes: BTreeMap<&str, BTreeMap<u32, usize>> = BTreeMap::new();
+    for h in handed {
+        *scenes.entry(&h.estimator).or_default().entry(h.rays).or_default() += 1;
+    }
     let is_stray = |h: &&Handed| {
-        let others = handed.iter().filter(|o| o.estimator == h.estimator).map(|o| scenes(&o.estimator, o.rays));
-        2 * scenes(&h.estimator, h.rays) < others.max().unwrap_or(0)
+        let of = &scenes[h.estimator.as_str()];
+        2 * of[&h.rays] < of.values().copied().max().unwrap_or(0)
     };
     handed.iter().filter(is_stray).collect()
 }

@@ -4,7 +4,6 @@ use super::{ScoreError, encoding::Encodings, self_check};
 use crate::{
     disk::DiskError,
     intake::{self, Declared, Finding, Handed, HandedImage, IntakeError, Keys, Means, Reference, Shown},
-    metrics::regions::Region,
     record::{Intervals, Shows, Source, told_once},
     run::{CaseImages, References},
     suite::Case,
@@ -21,6 +20,9 @@ pub(super) struct Reader<'a> {
     /// Whether codes that are not linear are meant to be so.
     pub is_declared: bool,
 }
+
+/// The size that an image should have and what it should show, where a kit tells.
+pub(super) type Expected = Option<([u32; 2], Reference)>;
 
 /// What a file, or a pair of them, holds.
 pub(super) struct Read {
@@ -154,7 +156,7 @@ impl Reader<'_> {
     }
 
     /// The size of the view and what images of a case look like; None where the kit has no such scene.
-    pub fn expected(&self, handed: &Handed) -> Result<Option<([u32; 2], Reference)>, DiskError> {
+    pub fn expected(&self, handed: &Handed) -> Result<Expected, DiskError> {
         if handed.scene == self_check::SCENE {
             return self_check::read(self.references).map(|(reference, view)| Some((view, reference)));
         }
@@ -174,11 +176,7 @@ impl Reader<'_> {
         let (Some(converged), Some(scene)) = (converged, self.references.scene(scene)) else {
             return Ok(Reference::default());
         };
-        let mut openness = vec![f32::NAN; converged.mean.len()];
-        for &i in self.references.regions(scene)?.pixels(Region::All) {
-            openness[i as usize] = converged.mean[i as usize];
-        }
-        Ok(Reference { openness, scaled: Vec::new() })
+        Ok(Reference::over(&converged.mean, &self.references.regions(scene)?))
     }
 
     /// Ends a case whose images are wrong as a whole, and notes what is doubtful.

@@ -1,13 +1,15 @@
 //! `aogauge bench cpu`
 
-use super::super::{Exit, Failure, Format, json, print, run::bar, scene::load, tell};
+use super::{
+    super::{Exit, Failure, Format, json, run::bar, scene::load},
+    hand_out,
+};
 use crate::{
     bench::cpu::{CpuBench, Settings, VERSION, processor, scene},
-    disk::write_whole,
     report::bench::cpu as tables,
     run::Observer,
 };
-use std::{io::Write, path::PathBuf};
+use std::path::PathBuf;
 
 /// Count the rays that the CPU traces a second, by kind, scene and number of threads.
 #[derive(Debug, clap::Args)]
@@ -80,16 +82,6 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
         bench.scenes.push(measured);
     }
     drop(bar);
-    if let Some(folder) = &args.out {
-        for (name, text) in [("bench.json", json(&bench)?), ("bench.md", tables::markdown(&bench))] {
-            let path = folder.join(name);
-            write_whole(&path, |buffer| buffer.write_all(text.as_bytes()))?;
-            tell(&path.display().to_string());
-        }
-    }
-    match args.format {
-        Format::Json => print(&json(&bench)?)?,
-        Format::Text => print(&tables::plain(&bench))?,
-    }
+    hand_out(args.out.as_deref(), args.format, &json(&bench)?, [tables::markdown(&bench), tables::plain(&bench)])?;
     Ok(Exit::Pass)
 }

@@ -17,6 +17,7 @@ mod tests;
 pub use agreement::{Disagreement, agreement};
 pub use place::{Turn, alike};
 
+use crate::metrics::regions::{Region, Regions};
 use samples::Samples;
 use std::{borrow::Cow, fmt};
 
@@ -29,6 +30,17 @@ pub struct Reference {
     /// The same with other R. Only factors that are here can be told; [`FACTORS`] are those
     /// that mistaken units lead to.
     pub scaled: Vec<Scaled>,
+}
+
+impl Reference {
+    /// A converged image over the pixels that see a surface, with no other R.
+    pub fn over(converged: &[f32], regions: &Regions) -> Self {
+        let mut openness = vec![f32::NAN; converged.len()];
+        for &i in regions.pixels(Region::All) {
+            openness[i as usize] = converged[i as usize];
+        }
+        Reference { openness, scaled: Vec::new() }
+    }
 }
 
 /// Openness with another R.

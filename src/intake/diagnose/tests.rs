@@ -280,7 +280,7 @@ fn the_self_check_shows_what_it_must() {
     assert!(shares.iter().all(|s| *s > 0.03), "{shares:?}");
     let gbuffer = GBuffer::new(&SELF.geometry.tracer, &SELF.scene.measure.view());
     let regions = Regions::new(&SELF.scene, &SELF.geometry.tracer, &gbuffer);
-    assert!(regions.pixels(crate::metrics::regions::Region::Footprint).is_empty());
+    assert!(regions.pixels(Region::Footprint).is_empty());
 }
 
 #[test]
