@@ -23,6 +23,9 @@ const MOST_ROUNDING: f32 = 0.02;
 /// Darker than this, linear light of range 1, nothing is divided.
 const FLOOR: f32 = 1e-4;
 
+/// So many floats that are exactly 1 are no chance.
+const PLATEAU: usize = 8;
+
 /// A whole frame as linear light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
@@ -30,8 +33,8 @@ pub struct Frame {
     /// where a channel is no finite number.
     pub light: Vec<f32>,
     /// By how much rounding to integers may have moved the luminance of each pixel: half a
-    /// code in linear light. Infinite where a channel has the highest code, since more may
-    /// have been cut off; 0 of floats.
+    /// code in linear light. Infinite where a channel has the highest code, or is cut off at 1 in a
+    /// frame of floats; else 0 of floats.
     pub rounding: Vec<f32>,
     /// What the stored numbers were taken for.
     pub encoding: Encoding,
@@ -132,6 +135,13 @@ fn integers(samples: &Samples) -> ([usize; 2], Vec<Vec<f32>>, f32) {
     (samples.size, planes, step)
 }
 
+/// Whether floats were cut off at white: 1 is the greatest of them, to the last bit, of many, and not of all.
+fn is_clipped(planes: &[Vec<f32>]) -> bool {
+    let all = || planes.iter().flatten().filter(|v| v.is_finite());
+    let (white, below) = (all().filter(|v| **v == 1.0).count(), all().filter(|v| **v < 1.0).count());
+    white >= PLATEAU && below > 0 && !all().any(|v| *v > 1.0)
+}
+
 /// Luminance a pixel, and by how much half a step of each channel moves it.
 fn lights(planes: &[Vec<f32>], step: f32, encoding: Encoding) -> [Vec<f32>; 2] {
     let decode = |code: f32| if encoding == Encoding::Srgb { linear(code) } else { code };
@@ -139,8 +149,15 @@ fn lights(planes: &[Vec<f32>], step: f32, encoding: Encoding) -> [Vec<f32>; 2] {
         [red, green, blue] => luminance([f(red[i]), f(green[i]), f(blue[i])]),
         _ => planes.first().map_or(f32::NAN, |grey| f(grey[i])),
     };
+    let is_clipped = step == 0.0 && is_clipped(planes);
     let rounded = |code: f32| match code {
-        _ if step == 0.0 => 0.0,
+        _ if step == 0.0 => {
+            if is_clipped && code >= 1.0 {
+                f32::INFINITY
+            } else {
+                0.0
+            }
+        }
         code if code >= 1.0 => f32::INFINITY,
         code => (decode(code + step / 2.0) - decode((code - step / 2.0).max(0.0))) / 2.0,
     };
@@ -274,6 +291,20 @@ mod tests {
         assert!(ratio(&black, &black).unwrap_err().to_string().contains("no pixel is known"));
         let short = Frame { light: vec![1.0; 4], ..black.clone() };
         assert!(ratio(&black, &short).unwrap_err().to_string().contains("5 and 4 pixels"));
+    }
+
+    #[test]
+    fn floats_cut_off_at_white_are_left_out() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let of = |most: f32| {
+            let light = (0..256).map(|i| (0.5 + i as f32 / 200.0).min(most)).collect::<Vec<f32>>();
+            Layers::new(VIEW).with("Y", light).write(&path).unwrap();
+            let without = frame(&path, &Declared::default(), VIEW).unwrap();
+            let with = Frame { light: vec![0.4; 256], rounding: vec![0.0; 256], ..without.clone() };
+            ratio(&with, &without).unwrap().masked
+        };
+        assert_eq!([of(1.0), of(2.0), of(0.9)], [156, 0, 0]);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use crate::{
     run::Facts,
+    scenes::Scene,
     suite::{EstimatorFile, Suite},
 };
 use schemars::JsonSchema;
@@ -29,8 +30,28 @@ pub struct Manifest {
     pub estimators: BTreeMap<String, EstimatorFile>,
     /// How images must be, where nothing else is declared.
     pub images: Conventions,
+    /// The scene to begin with, whose image is known.
+    pub self_check: ManifestSelfCheck,
     /// The scenes.
     pub scenes: Vec<ManifestScene>,
+}
+
+/// The self-check of a kit. Paths are relative to the kit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ManifestSelfCheck {
+    /// Its name.
+    pub name: String,
+    /// The scene, in metres.
+    pub glb: String,
+    /// Views, light, R and R' in numbers.
+    pub views: String,
+    /// What its image looks like, as sRGB codes, to be looked at.
+    pub expected: String,
+    /// Width and height of the image, pixels.
+    pub resolution: [u32; 2],
+    /// R, the length of a primary ray, metres.
+    pub radius: f64,
 }
 
 /// How images are read where nothing else is declared.
@@ -45,6 +66,8 @@ pub struct Conventions {
     pub rows: String,
     /// Where a pixel is sampled.
     pub sample: String,
+    /// The unit of `radius`, `secondary_radius` and of the scenes.
+    pub length: String,
     /// How files are called.
     pub names: String,
 }
@@ -78,7 +101,7 @@ pub struct ManifestScene {
 
 impl Manifest {
     /// That of a suite's kit.
-    pub(super) fn new(suite: &Suite, scenes: Vec<ManifestScene>) -> Self {
+    pub(super) fn new(suite: &Suite, self_check: ManifestSelfCheck, scenes: Vec<ManifestScene>) -> Self {
         Manifest {
             version: VERSION,
             tool: env!("CARGO_PKG_VERSION").to_owned(),
@@ -91,8 +114,10 @@ impl Manifest {
                 encoding: "linear".into(),
                 rows: "top first".into(),
                 sample: "pixel centre".into(),
+                length: "metre".into(),
                 names: "SCENE.ESTIMATOR.RAYS.REPLICATE.exr".into(),
             },
+            self_check,
             scenes,
         }
     }
@@ -112,6 +137,20 @@ impl ManifestScene {
             radius: facts.radius,
             secondary_radius: facts.secondary_radius,
             name: facts.name,
+        }
+    }
+}
+
+impl ManifestSelfCheck {
+    pub(super) fn new(folder: &str, scene: &Scene) -> Self {
+        let at = |file: &str| format!("{folder}/{}/{file}", scene.name);
+        ManifestSelfCheck {
+            glb: at(&format!("{}.glb", scene.name)),
+            views: at("views.json"),
+            expected: at("expected.png"),
+            resolution: scene.measure.resolution,
+            radius: f64::from(scene.ao.radius),
+            name: scene.name.clone(),
         }
     }
 }

@@ -6,6 +6,6 @@ mod scene;
 mod self_check;
 mod suite;
 
-pub use manifest::{Manifest, ManifestScene};
+pub use manifest::{Manifest, ManifestScene, ManifestSelfCheck};
 pub use scene::{KitError, write};
 pub use suite::{SCENES, SCORING, write_suite};

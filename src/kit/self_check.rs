@@ -21,8 +21,8 @@ pub(super) use crate::score::self_check::FILE;
 const RAYS: u32 = 256;
 
 /// Writes the scene into a folder of its name, with the picture `expected.png`, and its
-/// references into the folder that images are scored against.
-pub(super) fn write(seed: u32, scenes: &Path, scoring: &Path) -> Result<(), KitError> {
+/// references into the folder that images are scored against. Returns it.
+pub(super) fn write(seed: u32, scenes: &Path, scoring: &Path) -> Result<Scene, KitError> {
     let scene = Scene::from_toml(SCENE, "self-check.toml (built in)", SELF_CHECK, None)?;
     let folder = scenes.join(SCENE);
     scene::write(&scene, &folder)?;
@@ -44,5 +44,6 @@ pub(super) fn write(seed: u32, scenes: &Path, scoring: &Path) -> Result<(), KitE
         layers = layers.with(&format!("{SCALED}{factor}"), openness(factor)?);
     }
     let written: Result<(), DiskError> = layers.write(&scoring.join(FILE));
-    Ok(written?)
+    written?;
+    Ok(scene)
 }

@@ -2,7 +2,7 @@
 
 use super::{
     KitError,
-    manifest::{Manifest, ManifestScene},
+    manifest::{Manifest, ManifestScene, ManifestSelfCheck},
     scene, self_check,
 };
 use crate::{
@@ -58,13 +58,17 @@ pub fn write_suite(
         format!("{}\n{}\n", prepared.identity(&means.machine), crate::judge_cache::program().unwrap_or_default());
     let work = RecordFolder::resume(&folder.join(WORK), &plan)?;
     let scoring = folder.join(SCORING);
-    self_check::write(prepared.seed(), &folder.join(SCENES), &scoring)?;
+    let check = self_check::write(prepared.seed(), &folder.join(SCENES), &scoring)?;
     let references = prepared.write_references(means, &work, (&scoring, &[self_check::FILE]), observer)?;
     for scene in &suite.scenes {
         scene::write(scene, &folder.join(SCENES).join(&scene.name))?;
     }
     let scenes = references.scenes.into_iter();
-    let manifest = Manifest::new(suite, scenes.map(|s| ManifestScene::new(SCENES, s.facts)).collect());
+    let manifest = Manifest::new(
+        suite,
+        ManifestSelfCheck::new(SCENES, &check),
+        scenes.map(|s| ManifestScene::new(SCENES, s.facts)).collect(),
+    );
     let path = folder.join("README.md");
     let page = page(&manifest).map_err(|e| DiskError::content(&path, format!("the page cannot be made: {e}")))?;
     write_whole(&path, |out| out.write_all(page.as_bytes()))?;
