@@ -267,7 +267,7 @@ pub struct SceneRecord {
     /// How the error of each method falls with its rays, over all pixels and over
     /// the footprint.
     pub convergence: Vec<Convergence>,
-    /// Openness along the transect on the CPU at the most rays, and Q.
+    /// Openness along the transect on the CPU, or of what was handed in, at the most rays, and Q.
     pub profiles: Vec<Curve>,
     /// Region masks and converged images, relative to the record.
     pub image: String,

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     metrics::{Absent, Metric, MetricName},
-    record::{CaseRecord, IdleGate, Record, SceneRecord, SuiteInfo},
+    record::{CaseRecord, IdleGate, Intervals, Record, SceneRecord, SuiteInfo},
     stats::{Estimate, holm, spending},
     suite::Case,
 };
@@ -145,15 +145,23 @@ impl<'a> Run<'a> {
             };
             drafts.push(self.draft(gate, &scene.name, None, metric));
         }
+        let mut lone = None;
         for record in self.parts.cases.iter().filter(|c| gate.applies_to(&c.case)) {
             if let Some(metric) = record.metric(gate.metric, gate.region) {
+                // Of one image that was handed in, no gate waits for another.
+                if gate.metric == MetricName::DistinctReplicates && is_lone(record) {
+                    lone = metric.note.clone();
+                    continue;
+                }
                 drafts.push(self.draft(gate, &record.case.scene, Some(record), metric.clone()));
             }
         }
         if drafts.is_empty() {
             return Err(match self.filter {
                 Some(filter) => idle(format!("no case that was asked for (--filter {filter}) has this metric"), true),
-                None if self.handed_in => idle("nothing that was handed in has this metric".to_owned(), true),
+                None if self.handed_in => {
+                    idle(lone.unwrap_or_else(|| "nothing that was handed in has this metric".to_owned()), true)
+                }
                 None => idle("no case of this run has this metric".to_owned(), false),
             });
         }
@@ -236,6 +244,11 @@ impl<'a> Run<'a> {
         }
         verdict
     }
+}
+
+/// Whether a case is of one image that was handed in.
+fn is_lone(record: &CaseRecord) -> bool {
+    record.source.as_ref().is_some_and(|s| s.intervals == Intervals::Tiles)
 }
 
 /// A scene or an estimator that the gate names must not drop out of it unseen.

@@ -83,7 +83,7 @@ pub enum IntakeError {
     /// The frame with AO is the one without.
     #[error(
         "{with} and {without} are exchanged: {brighter} of {known} pixels are brighter in the frame with AO, which only takes \
-         light away; exchange `.with` and `.without` in their names"
+         light away; exchange `.with` and `.without` in their names, or save both with the same exposure"
     )]
     Exchanged {
         /// The frame that is called to be with AO.

@@ -151,14 +151,8 @@ fn lights(planes: &[Vec<f32>], step: f32, encoding: Encoding) -> [Vec<f32>; 2] {
     };
     let is_clipped = step == 0.0 && is_clipped(planes);
     let rounded = |code: f32| match code {
-        _ if step == 0.0 => {
-            if is_clipped && code >= 1.0 {
-                f32::INFINITY
-            } else {
-                0.0
-            }
-        }
-        code if code >= 1.0 => f32::INFINITY,
+        code if code >= 1.0 && (step > 0.0 || is_clipped) => f32::INFINITY,
+        _ if step == 0.0 => 0.0,
         code => (decode(code + step / 2.0) - decode((code - step / 2.0).max(0.0))) / 2.0,
     };
     let pixels = planes.first().map_or(0, Vec::len);
@@ -181,7 +175,8 @@ fn arranged(mut values: Vec<f32>, size: [usize; 2], declared: &Declared, view: [
 ///
 /// A pixel is not known where the frame without AO is darker than 1e-4, where half a code of
 /// both frames may have moved the ratio by more than 0.02 (8-bit sRGB codes below about 106,
-/// 8-bit linear ones below about 50, at a ratio of 1), or where a channel is at the highest code.
+/// 8-bit linear ones below about 50, at a ratio of 1), or where a channel is at the highest code, or
+/// at 1 in a frame of floats without AO whose greatest value that is, of some pixels and not of all.
 ///
 /// # Errors
 /// [`IntakeError::Ratio`] where the frames differ in size, or no pixel is known.
@@ -195,7 +190,10 @@ pub fn ratio(with: &Frame, without: &Frame) -> Result<Ratio, IntakeError> {
     for i in 0..pixels {
         let (a, b) = (with.light[i], without.light[i]);
         let value = a / b;
-        let rounding = (with.rounding[i] + value.abs() * without.rounding[i]) / b;
+        // With AO there is no more light: floats that reach white where those without AO were not cut off are open.
+        let is_open = without.rounding[i] == 0.0 && with.rounding[i].is_infinite();
+        let own = if is_open { 0.0 } else { with.rounding[i] };
+        let rounding = (own + value.abs() * without.rounding[i]) / b;
         let both = a.is_finite() && b.is_finite();
         // NaN is not known either.
         let known = both && b >= FLOOR && rounding <= MOST_ROUNDING;
@@ -305,6 +303,14 @@ mod tests {
             ratio(&with, &without).unwrap().masked
         };
         assert_eq!([of(1.0), of(2.0), of(0.9)], [156, 0, 0]);
+        // A white surface in light of 1: the open pixels of the frame with AO are 1, and not cut off.
+        Layers::new(VIEW)
+            .with("Y", (0..256).map(|i| (0.5 + i as f32 / 200.0).min(1.0)).collect())
+            .write(&path)
+            .unwrap();
+        let with = frame(&path, &Declared::default(), VIEW).unwrap();
+        let white = Frame { light: vec![1.0; 256], rounding: vec![0.0; 256], ..with.clone() };
+        assert_eq!(ratio(&with, &white).unwrap().masked, 0);
     }
 
     #[test]

@@ -10,6 +10,8 @@ use crate::{layers::code, metrics::image::Encoding};
 /// The other encoding must bring an image so much nearer to its reference, in mean square, that the
 /// declared one is wrong.
 const NEARER: f64 = 0.2;
+/// A curve whose exponent is so many times more or less than 1 is a factor.
+const MOST_BENT: f64 = 1.05;
 
 /// Where it is declared what images are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +49,14 @@ impl IntakeError {
 pub fn examine(image: &[f32], reference: &Reference, size: [usize; 2], declared: &Declared) -> Vec<Finding> {
     let mut found = diagnose(image, reference, size);
     let is_meaning = |f: &Finding| {
-        matches!(f, Finding::Curve { .. } | Finding::Strength { .. } | Finding::Encoded { .. } | Finding::Scaled { .. })
+        matches!(
+            f,
+            Finding::Curve { .. }
+                | Finding::Strength { .. }
+                | Finding::Encoded { .. }
+                | Finding::Scaled { .. }
+                | Finding::Between { .. }
+        )
     };
     if declared.encoding != Some(Encoding::Srgb) || !found.iter().any(is_meaning) {
         return found;
@@ -77,6 +86,22 @@ impl Finding {
             (Keys::Suite, _) => self.remedy().replace("declare `", "declare `image."),
         };
         format!("{}; {remedy}", self.title())
+    }
+
+    /// What a factor or a curve of a ratio of frames comes from, and whether that is an exposure.
+    pub fn of_frames(&self) -> Option<(String, bool)> {
+        let Finding::Curve { gain, exponent } = self else { return None };
+        let is_exposure = (exponent.ln()).abs() < MOST_BENT.ln();
+        let why = match is_exposure {
+            true => format!(
+                "exposure: where nothing occludes, the frame with AO is {gain:.2} times as bright as the one without it; \
+                 save both with the same exposure"
+            ),
+            false => {
+                format!("{}: AO is a factor in linear light alone; save both frames before tone mapping", self.title())
+            }
+        };
+        Some((why, is_exposure))
     }
 
     /// What is declared and is wrong, where that is the cause: to declare it would be no remedy.

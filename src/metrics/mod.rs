@@ -146,6 +146,17 @@ impl Metric {
         Some(Estimate { value: self.value?, se: self.se?, df: self.df.unwrap_or(1.0) })
     }
 
+    /// The regions that it is taken over.
+    pub fn regions(&self) -> &[Region] {
+        match (self.name, &self.region) {
+            (_, Some(region)) => std::slice::from_ref(region),
+            (MetricName::OverDarkening | MetricName::RendererDifference | MetricName::DistinctReplicates, None) => {
+                &[Region::All]
+            }
+            _ => &[Region::Footprint, Region::Left, Region::Right],
+        }
+    }
+
     /// `name` or `name over region`, for people.
     pub fn title(&self) -> String {
         match self.region {

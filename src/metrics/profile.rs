@@ -11,6 +11,10 @@ use serde::{Deserialize, Serialize};
 pub struct Curve {
     /// Estimator, or `Q`.
     pub label: String,
+    /// Whether it is light over that of the brighter flank, of whole frames that were handed in, and not
+    /// openness.
+    #[serde(skip_serializing_if = "std::ops::Not::not", default)]
+    pub light: bool,
     /// Value a column; null where the column sees no surface.
     pub value: Vec<Option<f64>>,
     /// Lower end of the interval.
@@ -30,7 +34,7 @@ fn column_mean(image: &[f32], width: usize, column: usize) -> f64 {
 }
 
 fn curve(label: &str, columns: impl Iterator<Item = Estimate>) -> Curve {
-    let mut curve = Curve { label: label.to_owned(), value: vec![], lo: vec![], hi: vec![] };
+    let mut curve = Curve { label: label.to_owned(), light: false, value: vec![], lo: vec![], hi: vec![] };
     for e in columns {
         let [lo, hi] = e.interval(0.95);
         let known = e.value.is_finite();
@@ -49,6 +53,15 @@ pub fn of_method(label: &str, replicates: &[Vec<f32>], width: usize) -> Curve {
             Estimate::of_mean(&replicates.iter().map(|image| column_mean(image, width, c)).collect::<Vec<_>>())
         }),
     )
+}
+
+/// The profile of whole frames: their light over `flank`, its mean over the brighter flank, above 0.
+pub fn of_frames(label: &str, replicates: &[Vec<f32>], width: usize, flank: f64) -> Curve {
+    let columns = (0..width).map(|c| {
+        let light: Vec<f64> = replicates.iter().map(|image| column_mean(image, width, c) / flank).collect();
+        Estimate::of_mean(&light)
+    });
+    Curve { light: true, ..curve(label, columns) }
 }
 
 /// The profile of Q: each column's ratio of mean irradiances.

@@ -186,13 +186,7 @@ fn freedom(metric: &Metric, parts: &[Part]) -> (f64, f64) {
         let own = parts.iter().filter(|p| p.within[region as usize]);
         own.fold((0.0, 1.0f64), |(df, most), p| (df + p.tiles.len() as f64 - 1.0, most.max(p.inflation())))
     };
-    use Region::{All, Footprint, Left, Right};
-    let read: &[Region] = match (metric.name, &metric.region) {
-        (_, Some(region)) => std::slice::from_ref(region),
-        (MetricName::OverDarkening | MetricName::RendererDifference, None) => &[All],
-        _ => &[Footprint, Left, Right],
-    };
-    read.iter().map(|&r| of(r)).fold((f64::INFINITY, 1.0), |a, b| (a.0.min(b.0), a.1.max(b.1)))
+    metric.regions().iter().map(|&r| of(r)).fold((f64::INFINITY, 1.0), |a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
 /// An image whose means over the regions are those of `converged` and of the drawn tiles of

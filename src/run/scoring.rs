@@ -19,7 +19,8 @@ use crate::{
     metrics::{
         Absent, Metric, MetricName,
         artifact::{Converged, Method as Measured},
-        judge::{JudgedRegions, vague},
+        judge::{Judge, JudgedRegions, vague},
+        profile::{self, Curve},
         regions::{Region, Regions},
         tiles,
     },
@@ -28,6 +29,10 @@ use crate::{
     suite::{Case, Method, Plan, Platform, Suite, SuiteError},
 };
 use std::{borrow::Cow, time::Instant};
+
+/// Where more of a region than this share is left out of a ratio, what remains does not stand for it: what is
+/// dark or white is so because of how it is lit.
+const MOST_LEFT_OUT: f64 = 0.1;
 
 /// The images of one case, as they were handed in.
 #[derive(Clone, Debug)]
@@ -151,7 +156,10 @@ impl Ready<'_> {
             }
             scored.note(&mut rendered);
             references.look(scene).map_err(RunError::Kit)?.write(&folder.path().join(look_image(&scene.facts.name)))?;
-            scenes.push(subject.scene_record(folder, &rendered, &judged, &Counts::all(u32::MAX))?);
+            let mut scene = subject.scene_record(folder, &rendered, &judged, &Counts::all(u32::MAX))?;
+            scene.profiles.retain(|c| c.label == Judge::LABEL);
+            scene.profiles.splice(0..0, scored.profiles());
+            scenes.push(scene);
         }
         let gpu = format!("none was used: the images were handed in, of the renderer '{}'", by.renderer);
         let mut info = super::suite_info(&plan);
@@ -169,6 +177,26 @@ impl Ready<'_> {
         });
         folder.commit(&record)?;
         Ok(record)
+    }
+}
+
+/// Takes back what was measured on too small a part of its regions.
+fn withhold(metrics: &mut [Metric], all: &Regions, known: &Regions) {
+    let left_out = |region: Region| {
+        let [all, known] = [all, known].map(|r| r.pixels(region).len());
+        (all - known) as f64 / all.max(1) as f64
+    };
+    for metric in metrics {
+        let most = metric.regions().iter().map(|&r| (left_out(r), r)).max_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((share, region)) = most.filter(|(share, _)| *share > MOST_LEFT_OUT && metric.value.is_some()) {
+            let why = format!(
+                "{:.0} % of the pixels of {} are left out, since they are too dark, too roughly rounded or cut off at \
+                 white; what remains does not stand for them",
+                100.0 * share,
+                region.label()
+            );
+            *metric = Metric::new(metric.name, metric.region, Err(Absent(why)));
+        }
     }
 }
 
@@ -231,7 +259,7 @@ impl Scored<'_> {
             self.metrics(handed, shows, images, regions, &against)
         };
         let is_one = handed.source.as_ref().is_some_and(|s| s.intervals == Intervals::Tiles);
-        let metrics = match images.as_slice() {
+        let mut metrics = match images.as_slice() {
             [one] if is_one => {
                 let center = rendered.truths.get(&index).filter(|_| shows != Shows::Frame);
                 let center = center.map(|t| t.converged.mean.as_slice());
@@ -239,6 +267,7 @@ impl Scored<'_> {
             }
             _ => measure(images, &known),
         };
+        withhold(&mut metrics, all, &known);
         let occluders = if shows == Shows::Openness && !is_one {
             let classic = |regions| self.classic_on(&handed.case, images.len(), regions, rendered);
             self.subject.by_occluder(index, &measured(images, converged, &known), &classic, self.judged)
@@ -373,7 +402,32 @@ impl Scored<'_> {
         }
     }
 
-    /// Puts images of openness where profiles and convergence are taken from.
+    /// What was handed in along the transect, of each estimator the case of the most rays.
+    fn profiles(&self) -> Vec<Curve> {
+        let rays = |h: &CaseImages| h.images.as_ref().map_or(0, |_| h.case.rays);
+        let most = |h: &CaseImages| {
+            let own = self.handed.iter().filter(|o| o.case.estimator == h.case.estimator);
+            own.map(|o| rays(o)).max().unwrap_or(0)
+        };
+        let width = self.subject.facts.resolution[0] as usize;
+        let of = |h: &&CaseImages| {
+            let (images, label) = (h.images.as_ref().ok()?, &h.case.estimator);
+            let shows = h.source.as_ref().map_or(Shows::Openness, |s| s.shows);
+            if shows != Shows::Frame {
+                return Some(profile::of_method(label, images, width));
+            }
+            let regions = self.subject.regions(self.subject.method(&h.case));
+            let flank = |side| {
+                let means: Vec<f64> = images.iter().filter_map(|i| regions.mean(side, i).ok()).collect();
+                means.iter().sum::<f64>() / means.len() as f64
+            };
+            let flank = flank(Region::Left).max(flank(Region::Right));
+            (flank > 0.0).then(|| profile::of_frames(label, images, width, flank))
+        };
+        self.handed.iter().filter(|h| h.images.is_ok() && h.case.rays == most(h)).filter_map(of).collect()
+    }
+
+    /// Puts images of openness where convergence is taken from.
     fn note(&self, rendered: &mut Rendered) {
         for handed in self.handed {
             if let (Ok(replicates), true) = (&handed.images, handed.is_openness()) {

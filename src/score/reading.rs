@@ -38,6 +38,8 @@ pub(super) struct Read {
 pub(super) struct Diagnosis {
     pub wrong: Vec<String>,
     pub doubtful: Vec<String>,
+    /// Both, of openness.
+    pub findings: Vec<Finding>,
 }
 
 /// What files show, by the word in their names.
@@ -193,6 +195,7 @@ impl Reader<'_> {
                 Shows::Frame => of_frame(image, &reference, light.as_deref(), size),
                 _ => self.of_openness(image, &reference, size, shows),
             };
+            own.doubtful.extend(self.apart(image, case, &reference, &own, size));
             if shows != Shows::Frame
                 && let Some(other) = self.rather(image, case, &reference)?
             {
@@ -224,8 +227,14 @@ impl Reader<'_> {
         // Frames are no occlusion, whatever is declared of AO.
         let means = if shows == Shows::Ratio { Means::Openness } else { self.declared.means };
         let declared = Declared { means, ..self.declared.clone() };
-        for finding in intake::examine(image, reference, size, &declared) {
+        found.findings = intake::examine(image, reference, size, &declared);
+        for finding in &found.findings {
             if shows == Shows::Ratio && matches!(finding, Finding::Holes { .. }) {
+                continue;
+            }
+            if let (Shows::Ratio, Some((why, is_exposure))) = (shows, finding.of_frames()) {
+                let to = if is_exposure { &mut found.wrong } else { &mut found.doubtful };
+                to.push(why);
                 continue;
             }
             // Where a frame is nearly dark, noise alone brings a ratio beyond its range.
@@ -236,6 +245,24 @@ impl Reader<'_> {
             to.push(finding.told(&declared, Keys::Score));
         }
         found
+    }
+
+    /// How far an image of classic AO is from its converged image, by more than noise, where nothing explains it.
+    /// Another falloff or radius may be meant.
+    fn apart(
+        &self,
+        image: &[f32],
+        case: &CaseImages,
+        reference: &Reference,
+        own: &Diagnosis,
+        size: [usize; 2],
+    ) -> Option<String> {
+        let suite = self.references.suite();
+        let is_classic = suite.methods[suite.classic()].name == case.case.estimator;
+        if !is_classic || self.is_declared || !case.is_openness() || !own.findings.is_empty() {
+            return None;
+        }
+        intake::agreement(image, reference, size, &[]).map(|apart| apart.to_string())
     }
 
     /// Which other scene of the kit an image looks like, where it does not look like its own.

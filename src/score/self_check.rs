@@ -70,11 +70,12 @@ pub(super) fn check(reader: &Reader<'_>, curve: Option<Curve>, handed: &[Handed]
                 return Err(wrong(found.wrong.join("; and: ")));
             }
             // What is expected is classic AO; a curve that is yet to be fitted is no disagreement.
-            if shows != Shows::Frame && of == classic && !reader.is_declared {
-                let known = intake::examine(values, &reference, size, &reader.declared);
-                if let Some(apart) = intake::agreement(values, &reference, size, &known) {
-                    return Err(ScoreError::Disagrees(format!("{}: {apart}", name_of(image))));
-                }
+            if shows != Shows::Frame
+                && of == classic
+                && !reader.is_declared
+                && let Some(apart) = intake::agreement(values, &reference, size, &found.findings)
+            {
+                return Err(ScoreError::Disagrees(format!("{}: {apart}", name_of(image))));
             }
             warnings.extend(found.doubtful.into_iter().map(|w| (image.path.clone(), w)));
         }

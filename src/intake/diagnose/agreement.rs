@@ -10,6 +10,8 @@ use std::fmt;
 const BLOCK: usize = 8;
 /// Steps that R is looked for in between two of the reference.
 const STEPS: u32 = 12;
+/// Known factors must lie nearer to each other than so many times for one between them to be told.
+const APART: f64 = 2.1;
 /// What is left of the mean square difference with another R that is named.
 const NAMED: f64 = 0.25;
 
@@ -46,8 +48,8 @@ pub fn agreement(image: &[f32], reference: &Reference, size: [usize; 2], found: 
     let plain = found.iter().find_map(|f| undone(f, image));
     let [rms, mean] = differs(plain.as_deref().unwrap_or(image), &reference.openness, size[0])?;
     let without = left(image, &reference.openness, size[0])[0];
-    let factor = factor(image, reference, size[0]).filter(|(_, left)| left[0] < NAMED * without);
-    Some(Disagreement { rms, mean, factor: factor.map(|(factor, _)| factor) })
+    let other = radius(image, reference, size[0]).filter(|r| r.is_told() && r.left[0] < NAMED * without);
+    Some(Disagreement { rms, mean, factor: other.map(|r| r.factor) })
 }
 
 /// Root mean square, without noise, and mean of the differences of blocks, where they are worth an explanation.
@@ -73,19 +75,34 @@ fn differs(image: &[f32], reference: &[f32], width: usize) -> Option<[f64; 2]> {
     (signal > DIFFERENT * DIFFERENT + SURE * error).then(|| [signal.sqrt(), mean / count])
 }
 
-/// The factor of R by which an image is nearest to its reference, between those that are known, and the mean
-/// square that is left with its error.
-pub(super) fn factor(image: &[f32], reference: &Reference, width: usize) -> Option<(f64, [f64; 2])> {
+/// The R by which an image is nearest to its reference.
+pub(super) struct Radius {
+    /// Times what was asked for.
+    pub factor: f64,
+    /// The known ones that it lies between.
+    pub between: [f64; 2],
+    /// The mean square that is left, with its error.
+    pub left: [f64; 2],
+}
+
+impl Radius {
+    /// Whether the factor itself can be told: farther apart, walls come into reach that neither of the two sees alone.
+    pub fn is_told(&self) -> bool {
+        self.between[1] < APART * self.between[0]
+    }
+}
+
+/// It, looked for between those that are known.
+pub(super) fn radius(image: &[f32], reference: &Reference, width: usize) -> Option<Radius> {
     let usable = reference.scaled.iter().filter(|s| s.openness.len() == image.len() && s.factor > 0.0);
     let mut known: Vec<(f64, &[f32])> = usable.map(|s| (s.factor, s.openness.as_slice())).collect();
     known.push((1.0, &reference.openness));
     known.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let between =
-        known.windows(2).flat_map(|pair| (0..=STEPS).map(move |step| (pair, f64::from(step) / f64::from(STEPS))));
-    let tried = between.map(|(pair, t)| {
+    let steps = |pair| (0..=STEPS).map(move |step| (pair, f64::from(step) / f64::from(STEPS)));
+    let tried = known.windows(2).flat_map(steps).map(|(pair, t)| {
         let [(low, a), (high, b)] = [pair[0], pair[1]];
         let mixed: Vec<f32> = a.iter().zip(b).map(|(a, b)| a + (b - a) * t as f32).collect();
-        (low * (high / low).powf(t), left(image, &mixed, width))
+        Radius { factor: low * (high / low).powf(t), between: [low, high], left: left(image, &mixed, width) }
     });
-    tried.reduce(|a, b| if b.1[0] < a.1[0] { b } else { a })
+    tried.reduce(|a, b| if b.left[0] < a.left[0] { b } else { a })
 }

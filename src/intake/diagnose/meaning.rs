@@ -45,6 +45,7 @@ pub(super) fn find(image: &[f32], reference: &Reference, width: usize) -> Option
     }
     let hypotheses = values(image, reference, width).into_iter().chain(scales(image, reference, width));
     let blended = strength(image, reference, width).filter(|h| explains(h.left, without));
+    let hypotheses = hypotheses.chain(gain(image, reference, width));
     let hypotheses = hypotheses.filter(|h| explains(h.left, without)).chain(blended.clone());
     let best = hypotheses.reduce(|a, b| if b.left[0] < a.left[0] { b } else { a })?;
     // One free number that does nearly as well as two is rather it.
@@ -101,6 +102,24 @@ fn strength(image: &[f32], reference: &Reference, width: usize) -> Option<Hypoth
     }
     let plain: Vec<f32> = image.iter().map(|v| 1.0 - (1.0 - v) / strength as f32).collect();
     Some(Hypothesis { finding: Finding::Strength { strength }, left: left(&plain, reference, width) })
+}
+
+/// A factor on all values, by least squares: it needs less variety to be told than a curve does.
+fn gain(image: &[f32], reference: &Reference, width: usize) -> Option<Hypothesis> {
+    let reference = &reference.openness;
+    if Samples::new(image, reference).deviation() < BLENDED {
+        return None;
+    }
+    let known = image.iter().zip(reference).map(|(a, b)| [*a, *b].map(f64::from));
+    let known = known.filter(|p| p.iter().all(|v| v.is_finite()));
+    let (both, own) = known.fold((0.0, 0.0), |(both, own), [a, b]| (both + a * b, own + b * b));
+    let gain = both / own;
+    if !STRENGTHS.contains(&gain) || gain.max(1.0 / gain) < GAINED {
+        return None;
+    }
+    let finding = Finding::Curve { gain, exponent: 1.0 };
+    let left = left(&undone(&finding, image)?, reference, width);
+    Some(Hypothesis { finding, left })
 }
 
 /// The image as it would be without what was found.
@@ -165,9 +184,14 @@ fn scales<'a>(image: &'a [f32], reference: &'a Reference, width: usize) -> impl 
 /// A factor between those that are known, where an image is nearer to that by more than noise leaves: the
 /// remedy of the nearest known one would be wrong.
 fn nearer_scale(image: &[f32], reference: &Reference, width: usize, known: [f64; 2]) -> Option<Finding> {
-    let (factor, left) = agreement::factor(image, reference, width)?;
-    let is_nearer = known[0] - left[0] > SURE * known[1].hypot(left[1]);
-    is_nearer.then(|| Finding::Scaled { factors: vec![factor] })
+    let found = agreement::radius(image, reference, width)?;
+    let is_nearer = known[0] - found.left[0] > SURE * known[1].hypot(found.left[1]);
+    let [low, high] = found.between;
+    let finding = || match found.is_told() {
+        true => Finding::Scaled { factors: vec![found.factor] },
+        false => Finding::Between { low, high },
+    };
+    is_nearer.then(finding)
 }
 
 /// All factors that the scene looks the same with as with the best of them, which comes first.

@@ -138,6 +138,13 @@ pub enum Finding {
         /// Times R.
         factors: Vec<f64>,
     },
+    /// R is not what was asked for, and lies between two factors that are too far apart to tell which it is.
+    Between {
+        /// The lower, times R.
+        low: f64,
+        /// The higher.
+        high: f64,
+    },
     /// It lies beside the reference.
     Shifted {
         /// Columns to the right and rows down, in halves of a pixel.
@@ -191,6 +198,7 @@ pub fn diagnose(image: &[f32], reference: &Reference, size: [usize; 2]) -> Vec<F
     let meaning = meaning::find(&upright, reference, size[0]);
     let factor = match &meaning {
         Some(Finding::Scaled { factors }) => factors.first().copied(),
+        Some(Finding::Between { low, high }) => Some((low * high).sqrt()),
         _ => None,
     };
     let plain = meaning.as_ref().and_then(|m| meaning::undone(m, &upright)).unwrap_or(upright);
@@ -300,6 +308,9 @@ impl Finding {
                 let factors: Vec<String> = factors.iter().map(|f| written(*f)).collect();
                 format!("scaled scene: R is {} times what was asked for", factors.join(" or "))
             }
+            Finding::Between { low, high } => {
+                format!("scaled scene: R is between {} and {} times what was asked for", written(*low), written(*high))
+            }
             Finding::Shifted { pixels: [x, y] } => format!("shifted by {x} columns and {y} rows"),
             Finding::Unlike { correlation } => {
                 format!("another picture: its correlation with the reference is {correlation:.2}")
@@ -359,6 +370,9 @@ impl Finding {
                     written(1.0 / factor),
                     written(factor)
                 )
+            }
+            Finding::Between { .. } => {
+                "one unit of the glb is a metre, and R is in metres: print both as the renderer has them".to_owned()
             }
             Finding::Shifted { .. } => {
                 "take samples at pixel centres of the camera `measure`, without jitter, and crop nothing".to_owned()

@@ -157,9 +157,10 @@ pub(super) fn scene(record: &Record, scene: &SceneRecord, converged: &Layers) ->
     lines.extend(scene.no_judge.iter().map(|why| format!("No judge: {why}.")));
     let curves: Vec<&str> = scene.profiles.iter().map(|c| c.label.as_str()).collect();
     let estimators = &record.suite.estimators;
+    let what = plots::along(&scene.profiles);
     let profile = plot(
-        "Openness along the transect",
-        format!("Openness over the place along the transect, with 95 % bands, of {}", curves.join(", ")),
+        &format!("Along the transect: {what}"),
+        format!("The {what} over the place along the transect, with 95 % bands, of {}", curves.join(", ")),
         plots::profile(estimators, scene, &Ranges::new(scene, converged)),
     );
     let convergence = plot(

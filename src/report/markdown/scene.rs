@@ -6,6 +6,7 @@ use super::{
         error_maps,
         gallery::Gallery,
         occluders::{self, OccluderCaseRow, OccluderRow},
+        plots,
         table::plus_minus,
     },
     anchor,
@@ -129,6 +130,7 @@ impl SceneSection {
         let [look, measure, noise] = grids(record, scene, gallery)?;
         let name = &scene.name;
         let by_region = scene.judge.is_some() && !brief;
+        let along = plots::along(&scene.profiles);
         Ok(SceneSection {
             anchor: anchor(place),
             description: scene.description.clone(),
@@ -143,7 +145,7 @@ impl SceneSection {
             look,
             measure,
             noise: noise.filter(|_| !brief),
-            profile: Plot::new(gallery, &format!("openness along the transect of {name}"), &pictures::profile(name))?,
+            profile: Plot::new(gallery, &format!("{along} along the transect of {name}"), &pictures::profile(name))?,
             convergence_plot: Plot::new(gallery, &format!("error over rays in {name}"), &pictures::convergence(name))?,
             more_cases: whole.len() - listed.len(),
             cases: listed,

@@ -19,7 +19,7 @@ pub use contrast_error::contrast_error;
 pub use convergence::convergence;
 pub use cost::cost;
 pub use p_values::p_values;
-pub use profile::{Ranges, profile};
+pub use profile::{Ranges, along, profile};
 
 use crate::record::CaseRecord;
 use legend::Sign;

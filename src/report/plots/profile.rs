@@ -1,4 +1,4 @@
-//! Openness along the transect of a scene: the paper's Fig. 3, measured.
+//! Openness, or light, along the transect of a scene: the paper's Fig. 3, measured.
 
 use super::{
     frame::{Axis, Frame, is_drawn},
@@ -86,7 +86,8 @@ pub fn profile(estimators: &[String], scene: &SceneRecord, ranges: &Ranges) -> R
         entries.push(if curve.label == Judge::LABEL {
             (Sign::Line { colour: BLACK, dash: "" }, "Q, what it does to the light".to_owned())
         } else {
-            (Sign::Curve(style, width), curve.label.clone())
+            let light = if curve.light { ", light" } else { "" };
+            (Sign::Curve(style, width), format!("{}{light}", curve.label))
         });
     }
     for (ranges, colour, text) in [(&ranges.under, UNDER, "under the occluder"), (&ranges.beside, BESIDE, "its flanks")]
@@ -104,8 +105,8 @@ pub fn profile(estimators: &[String], scene: &SceneRecord, ranges: &Ranges) -> R
         x: Axis::linear(scene.transect.iter().copied(), 0.0, 9.0),
         y: Axis::linear([0.0, highest].into_iter(), 0.0, 7.0),
     };
-    let mut sheet =
-        Sheet::new(top + FRAME + 54.0, &format!("{}: openness along the transect, 95 % bands", name(&scene.name)));
+    let title = format!("{}: {} along the transect, 95 % bands", name(&scene.name), along(&scene.profiles));
+    let mut sheet = Sheet::new(top + FRAME + 54.0, &title);
     legend.draw(&mut sheet);
     for (ranges, colour) in [(&ranges.beside, BESIDE), (&ranges.under, UNDER)] {
         for [from, to] in ranges {
@@ -118,9 +119,24 @@ pub fn profile(estimators: &[String], scene: &SceneRecord, ranges: &Ranges) -> R
         let (style, width) = look(curve);
         draw(&mut sheet, &frame, scene, curve, (style, width, i));
     }
-    let what = if scene.judge.is_some() { "openness O, occlusion ratio Q" } else { "openness O" };
-    frame.axes(&mut sheet, "place t / R along the transect", what);
+    let what = match along(&scene.profiles) {
+        "openness" => "openness O",
+        "light" => "light / flank",
+        _ => "O, light / flank",
+    };
+    let judge = if scene.judge.is_some() { ", occlusion ratio Q" } else { "" };
+    frame.axes(&mut sheet, "place t / R along the transect", &format!("{what}{judge}"));
     Ok(sheet.finish())
+}
+
+/// What the curves of methods are, in a word or two.
+pub fn along(curves: &[Curve]) -> &'static str {
+    let of = |light: bool| curves.iter().any(|c| c.label != Judge::LABEL && c.light == light);
+    match (of(false), of(true)) {
+        (_, false) => "openness",
+        (false, true) => "light",
+        (true, true) => "openness and light",
+    }
 }
 
 /// Band, curve and markers, a piece between holes at a time.
