@@ -143,6 +143,7 @@ fn replicates(record: &Record) -> String {
         (Some(least), Some(most)) if least < most => {
             format!("{least} to {most} {seeds}, each case as many as its verdicts took")
         }
+        (Some(1), _) if record.handed_in.is_some() => "the tiles of one image a case".to_owned(),
         (Some(least), _) => format!("{least} {seeds}"),
         _ => format!("{} {seeds}", record.suite.replicates),
     }

@@ -137,7 +137,7 @@ fn one_frame_has_intervals_over_tiles() {
         assert!(k.value.is_some() && k.se.is_some_and(|se| se > 0.0), "{k:?}");
     }
     let report = fs::read_to_string(images.out().join("report.md")).unwrap();
-    assert!(report.contains("block bootstrap"), "{report}");
+    assert!(report.contains("block bootstrap") && report.contains("over the tiles of one image a case"), "{report}");
     // That replicates differ is asked of replicates.
     let gates = images.out().with_extension("toml");
     let distinct = "[[gate]]\nname = 'distinct'\nmetric = 'distinct-replicates'\nmin = 1.0\n";
