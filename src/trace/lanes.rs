@@ -263,11 +263,10 @@ mod x86 {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, target_arch = "x86_64"))]
 mod tests {
     use super::*;
 
-    #[cfg(target_arch = "x86_64")]
     #[test]
     fn both_kinds_of_lanes_give_the_same_bits() {
         /// What each operation makes of two vectors, bits and masks.
