@@ -77,6 +77,15 @@ fn directions(tracer: &Tracer, origin: Vec3, normal: Vec3, group: u32) -> [Vec3;
     })
 }
 
+/// The first eight directions as rays without end.
+fn eight(origin: Vec3, directions: &[Vec3; 32]) -> Segments {
+    let mut rays = Segments::EMPTY;
+    for (lane, &direction) in directions[..8].iter().enumerate() {
+        rays.set(lane, origin, direction, 1e30);
+    }
+    rays
+}
+
 /// Bits of what is true.
 fn bits(f: impl Fn(usize) -> bool) -> u32 {
     (0..32).fold(0, |m, i| m | u32::from(f(i)) << i)
@@ -121,7 +130,9 @@ fn check(scene: &Scene, rays: u64) -> [Counts; 3] {
             portable.occluded_segments(&crossing, u32::MAX),
         );
         assert_eq!(bits(|i| i < 8 && fast.occluded(&at(i))), truth & 0xff);
-        for &direction in &directions[..8] {
+        let of_eight = eight(origin, &directions);
+        let of_eight = [&fast, &portable].map(|t| t.closest_of(&of_eight, 0xff));
+        for (lane, &direction) in directions[..8].iter().enumerate() {
             let ray = Ray::new(origin, direction, 1e30);
             let [truth, a, b] = [fast.scalar().closest(&ray), fast.closest(&ray), portable.closest(&ray)];
             closest.rays += 1;
@@ -133,6 +144,9 @@ fn check(scene: &Scene, rays: u64) -> [Counts; 3] {
             closest.false_hits += u64::from(a.is_some() && a != truth && !beside);
             closest.differ += u64::from(a != b);
             assert_eq!(fast.distance(&ray), a.map(|h| h.t));
+            for hits in &of_eight {
+                assert_eq!(hits.get(lane), a);
+            }
         }
     }
     [fans, segments, closest]

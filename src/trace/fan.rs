@@ -28,15 +28,14 @@
 
 use super::{
     Ray, Tracer,
-    free::{self, Sheared},
+    free::{self, Crossed, Sheared},
     lanes::Lanes,
     tree8::{Block, Node8},
     triangle::main_axis,
-    walk::{Bundle, Packet, Slopes, any_hit, exact_dot, load3, splat3, sub3},
+    walk::{Bundle, Packet, Slopes, U, any_hit, exact_dot, load3, splat3, sub3},
 };
 use glam::Vec3;
 
-const U: f32 = 1.0 / (1u32 << 24) as f32;
 const EDGE: f32 = 72.0 * U;
 const VOLUME: f32 = 288.0 * U;
 const REACH: f32 = 400.0 * U;
@@ -243,6 +242,7 @@ impl<L: Lanes> Volumes<L> {
 #[inline(always)]
 fn confirm<L: Lanes>(tracer: &Tracer, block: &Block, lanes: u32, fan: &Fan, direction: Vec3) -> bool {
     let ray = Sheared::new(fan.origin, direction, 1.0 / direction);
-    let met = free::meets::<L>(&ray, block, fan.tmax).0 & lanes;
-    met != 0 && tracer.comes_to_any(block, met, &Ray::new(fan.origin, direction, fan.tmax))
+    let Crossed { met, sure, .. } = free::meets::<L>(&ray, block, fan.tmax, fan.tmax);
+    let met = met & lanes;
+    sure & met != 0 || met != 0 && tracer.comes_to_any(block, met, &Ray::new(fan.origin, direction, fan.tmax))
 }

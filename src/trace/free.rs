@@ -8,7 +8,7 @@ use super::{
     lanes::Lanes,
     tree8::{Block, Node8},
     triangle::main_axis,
-    walk::{Bundle, Packet, Slopes, any_hit, load3},
+    walk::{Bundle, Packet, Slopes, U, any_hit, load3, sub3},
 };
 use glam::Vec3;
 
@@ -52,6 +52,60 @@ impl Segments {
     }
 }
 
+/// Segments that wait to be traced together.
+#[derive(Clone, Debug)]
+pub struct Queue {
+    segments: [Segments; 4],
+    count: usize,
+}
+
+impl Default for Queue {
+    fn default() -> Self {
+        Queue { segments: [Segments::EMPTY; 4], count: 0 }
+    }
+}
+
+impl Queue {
+    /// The most that wait.
+    pub const MOST: usize = 32;
+
+    /// How many wait.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there is no room for another.
+    pub fn is_full(&self) -> bool {
+        self.count == Self::MOST
+    }
+
+    /// Puts one down, which must not be done where the queue is full.
+    #[inline]
+    pub fn push(&mut self, origin: Vec3, direction: Vec3, tmax: f32) {
+        let at = self.count % Self::MOST;
+        self.segments[at / 8].set(at % 8, origin, direction, tmax);
+        self.count += 1;
+    }
+
+    /// Empties the queue: which of those that waited meet anything, a bit each.
+    pub fn occluded(&mut self, tracer: &Tracer) -> u32 {
+        let count = std::mem::take(&mut self.count);
+        if count == 0 {
+            return 0;
+        }
+        let packs = count.div_ceil(8);
+        self.segments[packs - 1].fill(count - 8 * (packs - 1));
+        let mask = u32::MAX >> (32 - count);
+        let [a, b, c, d] = self.segments;
+        match packs {
+            1 => tracer.occluded_segments(&[a], mask),
+            2 => tracer.occluded_segments(&[a, b], mask),
+            3 => tracer.occluded_segments(&[a, b, c, c], mask),
+            _ => tracer.occluded_segments(&[a, b, c, d], mask),
+        }
+    }
+}
+
 /// What the triangle test needs of a ray: a part of the scalar one.
 #[derive(Clone, Copy)]
 pub(super) struct Sheared {
@@ -71,31 +125,77 @@ impl Sheared {
     }
 }
 
-/// Where a ray meets the eight triangles of a block, within `(0, tmax]`: a bit a
-/// triangle, and the distances. Twin: `Ray::meets`.
+/// Where a ray meets the eight triangles of a block.
+#[derive(Clone, Copy)]
+pub(super) struct Crossed<L> {
+    /// A bit for each triangle that is met within `(0, tmax]`.
+    pub met: u32,
+    /// Those of them that are met without rounding, too.
+    pub sure: u32,
+    /// Distances.
+    pub t: L,
+    /// Weights of the corners, up to their sum.
+    pub volumes: [L; 3],
+    /// That sum.
+    pub sum: L,
+}
+
+/// The rounding of an edge function: see [`Crossed::sure`].
+const EDGE: [f32; 2] = [64.0 * U, 16.0 * U];
+
+/// Where a ray meets the eight triangles of a block, within `(0, tmax]`. Twin:
+/// `Ray::meets`.
+///
+/// What is met without rounding within `(0, whole]` lies in its leaf's box, so that the
+/// scalar walk comes to it. With u = 2^-24, m the largest coordinate of a triangle's corners
+/// relative to the origin, and s the largest sheared one, which is the distance from the ray:
+/// - a sheared coordinate errs by 8 u m: 1 for the difference, 2 for the shear, 1 for its
+///   product with z that errs by 1, and 2 for the last difference;
+/// - so an edge function errs by 32 u m s + 128 u^2 m^2 for its factors and 4 u s^2, at most
+///   8 u m s, for its own operations: by less than e = 64 u m (s + 16 u m);
+/// - the sum of three by 4 e; the numerator of t, with a shear of at most 1.74, by 8 m e;
+/// - t, at most 1.74 m, times the sum by less than 16 m e.
 #[inline(always)]
-pub(super) fn meets<L: Lanes>(ray: &Sheared, block: &Block, tmax: f32) -> (u32, L) {
+pub(super) fn meets<L: Lanes>(ray: &Sheared, block: &Block, tmax: f32, whole: f32) -> Crossed<L> {
     let [x, y, z] = ray.axes;
-    let (ox, oy, oz) = (L::splat(ray.origin[x]), L::splat(ray.origin[y]), L::splat(ray.origin[z]));
+    let o = [L::splat(ray.origin[x]), L::splat(ray.origin[y]), L::splat(ray.origin[z])];
     let (sx, sy) = (L::splat(ray.shear.x), L::splat(ray.shear.y));
     let [a, b, c] = &block.corners;
-    let (az, bz, cz) = (L::load(&a[z]).sub(oz), L::load(&b[z]).sub(oz), L::load(&c[z]).sub(oz));
-    let (ax, ay) = (L::load(&a[x]).sub(ox).sub(sx.mul(az)), L::load(&a[y]).sub(oy).sub(sy.mul(az)));
-    let (bx, by) = (L::load(&b[x]).sub(ox).sub(sx.mul(bz)), L::load(&b[y]).sub(oy).sub(sy.mul(bz)));
-    let (cx, cy) = (L::load(&c[x]).sub(ox).sub(sx.mul(cz)), L::load(&c[y]).sub(oy).sub(sy.mul(cz)));
+    let a = sub3([L::load(&a[x]), L::load(&a[y]), L::load(&a[z])], o);
+    let b = sub3([L::load(&b[x]), L::load(&b[y]), L::load(&b[z])], o);
+    let c = sub3([L::load(&c[x]), L::load(&c[y]), L::load(&c[z])], o);
+    let (ax, ay) = (a[0].sub(sx.mul(a[2])), a[1].sub(sy.mul(a[2])));
+    let (bx, by) = (b[0].sub(sx.mul(b[2])), b[1].sub(sy.mul(b[2])));
+    let (cx, cy) = (c[0].sub(sx.mul(c[2])), c[1].sub(sy.mul(c[2])));
     let u = cx.mul(by).sub(cy.mul(bx));
     let v = ax.mul(cy).sub(ay.mul(cx));
     let w = bx.mul(ay).sub(by.mul(ax));
     let zero = L::splat(0.0);
     let inside = zero.le(u.min(v).min(w)) | u.max(v).max(w).le(zero);
+    let none = Crossed { met: 0, sure: 0, t: zero, volumes: [u, v, w], sum: zero };
     if inside == 0 {
-        return (0, zero);
+        return none;
     }
-    let det = u.add(v).add(w);
-    let t = L::splat(ray.shear.z).mul(u.mul(az).add(v.mul(bz)).add(w.mul(cz))).div(det);
-    // Where det is 0, t is infinite or NaN.
-    let least = L::splat(f32::from_bits(1));
-    (L::le2(least, t, t, L::splat(tmax)) & inside, t)
+    let sum = u.add(v).add(w);
+    let t = L::splat(ray.shear.z).mul(u.mul(a[2]).add(v.mul(b[2])).add(w.mul(c[2]))).div(sum);
+    // Where the sum is 0, t is infinite or NaN.
+    let met = L::le2(L::splat(f32::from_bits(1)), t, t, L::splat(tmax)) & inside;
+    if met == 0 {
+        return none;
+    }
+    let m = largest(a).max(largest(b)).max(largest(c));
+    let s = largest([ax, bx, cx]).max(largest([ay, by, cy]));
+    let edge = L::splat(EDGE[0]).mul(m).mul(s.add(L::splat(EDGE[1]).mul(m)));
+    let depth = L::splat(16.0).mul(m).mul(edge);
+    let (least, size) = (u.abs().min(v.abs()).min(w.abs()), sum.abs());
+    let sure = L::le2(edge, least, depth, t.mul(size)) & depth.le(L::splat(whole).sub(t).mul(size));
+    Crossed { met, sure: met & sure, t, volumes: [u, v, w], sum }
+}
+
+/// The largest without sign, lane by lane.
+#[inline(always)]
+fn largest<L: Lanes>(v: [L; 3]) -> L {
+    v[0].abs().max(v[1].abs()).max(v[2].abs())
 }
 
 struct Own<'a, L, const N: usize> {
@@ -156,8 +256,11 @@ impl<L: Lanes, const N: usize> Bundle<L> for Own<'_, L, N> {
             let [x, y, z, ..] = &self.slopes[packet].0;
             let inverse = Vec3::new(x[lane], y[lane], z[lane]);
             let ray = Sheared::new(s.origins.get(lane), s.directions.get(lane), inverse);
-            let (met, _) = meets::<L>(&ray, block, s.tmax[lane]);
-            if met != 0 {
+            let tmax = s.tmax[lane];
+            let Crossed { met, sure, .. } = meets::<L>(&ray, block, tmax, tmax);
+            if sure != 0 {
+                closed |= 1 << i;
+            } else if met != 0 {
                 let ray = Ray::new(s.origins.get(lane), s.directions.get(lane), s.tmax[lane]);
                 closed |= u32::from(self.tracer.comes_to_any(block, met, &ray)) << i;
             }

@@ -25,6 +25,8 @@ pub trait Lanes: Copy {
     fn mul(self, b: Self) -> Self;
     /// `self / b`.
     fn div(self, b: Self) -> Self;
+    /// Square root.
+    fn sqrt(self) -> Self;
     /// `self * b + c`, fused or not.
     fn mul_add(self, b: Self, c: Self) -> Self;
     /// `self * b - c`, fused or not.
@@ -112,6 +114,10 @@ impl Lanes for Plain {
         self.zip(b, |a, b| a / b)
     }
     #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.zip(self, |a, _| a.sqrt())
+    }
+    #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
         self.mul(b).add(c)
     }
@@ -170,7 +176,7 @@ mod x86 {
     use std::arch::x86_64::{
         __m256, _CMP_LE_OQ, _mm256_add_ps, _mm256_and_ps, _mm256_andnot_ps, _mm256_cmp_ps, _mm256_div_ps,
         _mm256_fmadd_ps, _mm256_fmsub_ps, _mm256_loadu_ps, _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps,
-        _mm256_mul_ps, _mm256_set1_ps, _mm256_storeu_ps, _mm256_sub_ps, _mm256_xor_ps, _pdep_u64,
+        _mm256_mul_ps, _mm256_set1_ps, _mm256_sqrt_ps, _mm256_storeu_ps, _mm256_sub_ps, _mm256_xor_ps, _pdep_u64,
     };
 
     /// AVX2 with FMA and BMI2. Its methods may only be called where the machine has
@@ -215,6 +221,10 @@ mod x86 {
         #[inline(always)]
         fn div(self, b: Self) -> Self {
             Avx2(intrinsic!(_mm256_div_ps(self.0, b.0)))
+        }
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            Avx2(intrinsic!(_mm256_sqrt_ps(self.0)))
         }
         #[inline(always)]
         fn mul_add(self, b: Self, c: Self) -> Self {
@@ -278,6 +288,7 @@ mod tests {
                 x.sub(y),
                 x.mul(y),
                 x.div(y),
+                x.sqrt(),
                 x.min(y),
                 x.max(y),
                 x.abs(),

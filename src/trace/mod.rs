@@ -3,6 +3,7 @@
 //! - [`Tracer::occluded_from`] of all rays of a shaded point together, which share
 //!   their origin and length;
 //! - [`Tracer::occluded_segments`] of rays with origins of their own;
+//! - [`Tracer::closest_of`] of what eight rays meet first;
 //! - [`Tracer::closest`], [`Tracer::distance`] and [`Tracer::occluded`] of one ray;
 //! - [`Tracer::scalar`] where only some triangles count.
 //!
@@ -14,6 +15,7 @@
 //! tells how. The GPU walks the same tree in eight bits a plane.
 
 mod build;
+mod eight;
 mod fan;
 mod fold;
 mod free;
@@ -27,8 +29,9 @@ mod walk;
 mod wide;
 
 pub use build::Node;
+pub use eight::Hits;
 pub use fan::Fan;
-pub use free::Segments;
+pub use free::{Queue, Segments};
 pub use nearest::Nearest;
 pub use scalar::Scalar;
 pub use triangle::Ray;
@@ -74,18 +77,18 @@ pub struct Tracer {
 
 /// Runs a walk by AVX2 where the machine has it, else by arrays.
 macro_rules! by_lanes {
-    ($fast:expr, $module:ident::$walk:ident [$($n:ident)? $(=$any:literal)?], ($($arg:ident: $type:ty),*) -> $out:ty) => {{
+    ($fast:expr, $module:ident::$walk:ident [$($n:ident)?], ($($arg:ident: $type:ty),*) -> $out:ty) => {{
         #[cfg(target_arch = "x86_64")]
         if $fast {
             #[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt")]
             fn wide $(<const $n: usize>)? ($($arg: $type),*) -> $out {
-                $module::$walk::<lanes::Avx2 $(, $n)? $(, $any)?>($($arg),*)
+                $module::$walk::<lanes::Avx2 $(, $n)?>($($arg),*)
             }
             // SAFETY: `fast` is `has_avx2()` or false, and that asks for all of these.
             // Tested against the portable walks by `every_answer_is_the_scalar_walks`.
             return unsafe { wide($($arg),*) };
         }
-        $module::$walk::<lanes::Plain $(, $n)? $(, $any)?>($($arg),*)
+        $module::$walk::<lanes::Plain $(, $n)?>($($arg),*)
     }};
 }
 
@@ -178,7 +181,7 @@ impl Tracer {
 
     /// Whether anything lies on the ray within `(0, tmax]`.
     pub fn occluded(&self, ray: &Ray) -> bool {
-        self.any(ray).is_some()
+        self.any(ray)
     }
 
     /// Distance along the ray, within `(0, tmax]`, to the nearest triangle.
@@ -190,21 +193,26 @@ impl Tracer {
     /// distance the first in the scene, whatever the order of the walk.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         let met = self.first(ray)?;
-        let leaf = self.tree.blocks[met.block as usize].triangle[met.lane] as usize;
-        let (t, weights) = ray.meets(&self.triangles[leaf], met.t)?;
-        Some(self.hit(ray, t, leaf, weights))
+        Some(self.hit(ray, met.t, met.triangle(self) as usize, met.weights))
+    }
+
+    /// [`Self::closest`] of eight rays, of those in `mask`.
+    #[inline]
+    pub fn closest_of(&self, rays: &Segments, mask: u32) -> Hits {
+        let tracer = self;
+        by_lanes!(self.fast, eight::closest[], (tracer: &Tracer, rays: &Segments, mask: u32) -> Hits)
     }
 
     #[inline]
     fn first(&self, ray: &Ray) -> Option<one::Met> {
         let tracer = self;
-        by_lanes!(self.fast, one::walk[=false], (tracer: &Tracer, ray: &Ray) -> Option<one::Met>)
+        by_lanes!(self.fast, one::first[], (tracer: &Tracer, ray: &Ray) -> Option<one::Met>)
     }
 
     #[inline]
-    fn any(&self, ray: &Ray) -> Option<one::Met> {
+    fn any(&self, ray: &Ray) -> bool {
         let tracer = self;
-        by_lanes!(self.fast, one::walk[=true], (tracer: &Tracer, ray: &Ray) -> Option<one::Met>)
+        by_lanes!(self.fast, one::any[], (tracer: &Tracer, ray: &Ray) -> bool)
     }
 
     /// What is known of a hit on a triangle, by its barycentric weights.

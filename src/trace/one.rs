@@ -3,12 +3,13 @@
 
 use super::{
     Tracer,
-    free::{Sheared, meets},
-    lanes::Lanes,
-    tree8::LEAF,
+    free::{Crossed, Sheared, meets},
+    lanes::{Lanes, Plain},
+    tree8::{LEAF, Node8},
     triangle::Ray,
     walk::{STACK, slabs_of_one},
 };
+use glam::Vec3;
 use std::mem::MaybeUninit;
 
 /// What a ray met.
@@ -16,101 +17,213 @@ use std::mem::MaybeUninit;
 pub(super) struct Met {
     /// Distance, metres.
     pub t: f32,
-    /// The triangle, as it was numbered when the tracer was built.
-    triangle: u32,
-    /// Its block.
+    /// The triangle's block, and its place there.
     pub block: u32,
-    /// Its place there.
     pub lane: usize,
+    /// Barycentric weights of its corners.
+    pub weights: Vec3,
+}
+
+impl Met {
+    /// The triangle, as numbered in [`Tracer::triangles`].
+    #[inline(always)]
+    pub fn triangle(&self, tracer: &Tracer) -> u32 {
+        tracer.tree.blocks[self.block as usize].triangle[self.lane & 7]
+    }
+}
+
+/// The nearest triangle on a ray, of several at one distance the first in the scene.
+///
+/// Whether the scalar walk comes to its leaf is asked of the nearest alone: where it does,
+/// no triangle that it does not come to was nearer. Where it does not, which is rare beyond
+/// measure, it is asked of every triangle that is met.
+#[inline(always)]
+pub(super) fn first<L: Lanes>(tracer: &Tracer, ray: &Ray) -> Option<Met> {
+    let (met, sure) = nearest::<L, false>(tracer, ray)?;
+    if sure || tracer.comes_to(ray, met.triangle(tracer)) { Some(met) } else { first_with_care(tracer, ray) }
+}
+
+#[cold]
+#[inline(never)]
+fn first_with_care(tracer: &Tracer, ray: &Ray) -> Option<Met> {
+    nearest::<Plain, true>(tracer, ray).map(|(met, _)| met)
+}
+
+/// The nearest triangle, and whether it is met without rounding, too; with `CARE`, of those
+/// that the scalar walk comes to.
+#[inline(always)]
+fn nearest<L: Lanes, const CARE: bool>(tracer: &Tracer, ray: &Ray) -> Option<(Met, bool)> {
+    let Tracer { tree, source, .. } = tracer;
+    let sheared = Sheared { origin: ray.origin, axes: ray.axes, shear: ray.shear };
+    let mut walk = Walk::<L>::new(tracer, ray)?;
+    let mut nearest: Option<(u32, usize)> = None;
+    let (mut kept, mut are_sure) = ([[0.0; 8]; 4], 0);
+    while let Some(index) = walk.next_leaf::<true>(tracer) {
+        let block = &tree.blocks[index as usize];
+        let Crossed { mut met, sure, t, volumes, sum } = meets::<L>(&sheared, block, walk.tmax, ray.tmax);
+        if met == 0 {
+            continue;
+        }
+        let mut distances = [0.0; 8];
+        t.store(&mut distances);
+        let mut is_changed = false;
+        while met != 0 {
+            let lane = met.trailing_zeros() as usize & 7;
+            met &= met - 1;
+            let (t, triangle) = (distances[lane], block.triangle[lane]);
+            let number = |triangle: u32| source[triangle as usize];
+            let is_nearer = t < walk.tmax
+                || t == walk.tmax
+                    && nearest.is_none_or(|(block, lane)| {
+                        number(triangle) < number(tree.blocks[block as usize].triangle[lane])
+                    });
+            if is_nearer && (!CARE || tracer.comes_to(ray, triangle)) {
+                (nearest, walk.tmax, is_changed) = (Some((index, lane)), t, true);
+            }
+        }
+        if is_changed {
+            are_sure = sure;
+            let [u, v, w] = volumes;
+            u.store(&mut kept[0]);
+            v.store(&mut kept[1]);
+            w.store(&mut kept[2]);
+            sum.store(&mut kept[3]);
+        }
+    }
+    let (block, lane) = nearest?;
+    let weights = Vec3::new(kept[0][lane], kept[1][lane], kept[2][lane]) / kept[3][lane];
+    Some((Met { t: walk.tmax, block, lane, weights }, are_sure >> lane & 1 == 1))
+}
+
+/// Whether a ray meets any triangle.
+#[inline(always)]
+pub(super) fn any<L: Lanes>(tracer: &Tracer, ray: &Ray) -> bool {
+    let sheared = Sheared { origin: ray.origin, axes: ray.axes, shear: ray.shear };
+    let Some(mut walk) = Walk::<L>::new(tracer, ray) else { return false };
+    while let Some(block) = walk.next_leaf::<false>(tracer) {
+        let block = &tracer.tree.blocks[block as usize];
+        let Crossed { met, sure, .. } = meets::<L>(&sheared, block, ray.tmax, ray.tmax);
+        if sure != 0 || met != 0 && tracer.comes_to_any(block, met, ray) {
+            return true;
+        }
+    }
+    false
 }
 
 /// Where to go on, and from which distance.
 type Entry = MaybeUninit<(f32, u32)>;
 
-/// The nearest triangle on a ray, of several at one distance the first in the scene;
-/// or whichever is found first, where `ANY` will do.
-#[inline(always)]
-pub(super) fn walk<L: Lanes, const ANY: bool>(tracer: &Tracer, ray: &Ray) -> Option<Met> {
-    let Tracer { tree, source, .. } = tracer;
-    if tree.nodes.is_empty() {
-        return None;
-    }
-    let sheared = Sheared { origin: ray.origin, axes: ray.axes, shear: ray.shear };
-    let i = ray.inverse;
-    let start = ray.origin * i;
-    let slopes = [L::splat(i.x), L::splat(i.y), L::splat(i.z), L::splat(start.x), L::splat(start.y), L::splat(start.z)];
-    let near_planes = [0, 1, 2].map(|axis| if i[axis] < 0.0 { axis + 3 } else { axis });
-    let mut stack: [Entry; STACK] = [const { MaybeUninit::uninit() }; STACK];
-    stack[0].write((0.0, 0));
-    let mut height = 1;
-    let mut tmax = ray.tmax;
-    let mut best: Option<Met> = None;
-    while height > 0 {
-        height -= 1;
-        // SAFETY: all below `height` are written, and `STACK` is never reached: tested by
-        // `the_stack_is_never_full`.
-        let (entry, at) = unsafe { stack[height & (STACK - 1)].assume_init() };
-        if entry > tmax * 1.000_001 {
-            continue;
-        }
-        if at & LEAF != 0 {
-            let block = at & !LEAF;
-            let triangles = &tree.blocks[block as usize];
-            let (mut met, t) = meets::<L>(&sheared, triangles, tmax);
-            if met == 0 {
-                continue;
-            }
-            let mut distances = [0.0; 8];
-            t.store(&mut distances);
-            while met != 0 {
-                let lane = met.trailing_zeros() as usize & 7;
-                met &= met - 1;
-                let (t, triangle) = (distances[lane], source[triangles.triangle[lane] as usize]);
-                let is_better = best.is_none_or(|b| t < b.t || t == b.t && triangle < b.triangle);
-                if is_better && tracer.comes_to(ray, triangles.triangle[lane]) {
-                    best = Some(Met { t, triangle, block, lane });
-                    tmax = t;
-                }
-            }
-            if ANY && best.is_some() {
-                return best;
-            }
-            continue;
-        }
-        let node = &tree.nodes[at as usize];
-        let (met, from) = slabs_of_one(node, near_planes, slopes, L::splat(tmax));
-        let mut entries = [0.0; 8];
-        from.store(&mut entries);
-        push::<ANY>(&mut stack, &mut height, met, &entries, &node.child);
-    }
-    best
+/// The way of a ray from leaf to leaf.
+struct Walk<L> {
+    slopes: [L; 6],
+    near_planes: [usize; 3],
+    stack: [Entry; STACK],
+    height: usize,
+    /// How far to look.
+    tmax: f32,
 }
 
-/// Puts down the children that are met, the nearest on top unless any will do: then
-/// those that the tree has last, its leaves.
-#[inline(always)]
-fn push<const ANY: bool>(
-    stack: &mut [Entry; STACK],
-    height: &mut usize,
-    mut met: u32,
-    entries: &[f32; 8],
-    child: &[u32; 8],
-) {
-    let first = *height;
-    while met != 0 {
-        let k = met.trailing_zeros() as usize & 7;
+impl<L: Lanes> Walk<L> {
+    /// From the root, if there is one.
+    #[inline(always)]
+    fn new(tracer: &Tracer, ray: &Ray) -> Option<Self> {
+        if tracer.tree.nodes.is_empty() {
+            return None;
+        }
+        let i = ray.inverse;
+        let start = ray.origin * i;
+        let mut walk = Walk {
+            slopes: [
+                L::splat(i.x),
+                L::splat(i.y),
+                L::splat(i.z),
+                L::splat(start.x),
+                L::splat(start.y),
+                L::splat(start.z),
+            ],
+            near_planes: [near_plane(i, 0), near_plane(i, 1), near_plane(i, 2)],
+            stack: [const { MaybeUninit::uninit() }; STACK],
+            height: 1,
+            tmax: ray.tmax,
+        };
+        walk.stack[0].write((0.0, 0));
+        Some(walk)
+    }
+
+    /// The block of the next leaf; the nearest first where `NEAREST`.
+    #[inline(always)]
+    fn next_leaf<const NEAREST: bool>(&mut self, tracer: &Tracer) -> Option<u32> {
+        while self.height > 0 {
+            self.height -= 1;
+            // SAFETY: all below `height` are written, and `STACK` is never reached: tested
+            // by `the_stack_is_never_full`.
+            let (entry, mut at) = unsafe { self.stack[self.height & (STACK - 1)].assume_init() };
+            if entry > self.tmax * 1.000_001 {
+                continue;
+            }
+            loop {
+                if at & LEAF != 0 {
+                    return Some(at & !LEAF);
+                }
+                let Some(child) = self.children::<NEAREST>(&tracer.tree.nodes[at as usize]) else { break };
+                at = child;
+            }
+        }
+        None
+    }
+
+    /// The child to go on with, after those that are left were put down: the nearest unless
+    /// any will do, else the last that the tree has, its leaves.
+    #[inline(always)]
+    fn children<const NEAREST: bool>(&mut self, node: &Node8) -> Option<u32> {
+        let (mut met, from) = slabs_of_one(node, self.near_planes, self.slopes, L::splat(self.tmax));
+        if met == 0 {
+            return None;
+        }
+        let first = met.trailing_zeros() as usize & 7;
         met &= met - 1;
-        let mut place = *height;
-        while !ANY && place > first {
-            // SAFETY: all from `first` to `height` are written by this function.
-            let below = unsafe { stack[(place - 1) & (STACK - 1)].assume_init() };
-            if below.0 >= entries[k] {
+        let mut next = node.child[first];
+        if met == 0 {
+            return Some(next);
+        }
+        let mut entries = [0.0; 8];
+        from.store(&mut entries);
+        let mut next_entry = entries[first];
+        let bottom = self.height;
+        while met != 0 {
+            let k = met.trailing_zeros() as usize & 7;
+            met &= met - 1;
+            let mut put = (entries[k], node.child[k]);
+            // The nearer of two goes on, of two alike the later.
+            if !NEAREST || put.0 <= next_entry {
+                std::mem::swap(&mut put.0, &mut next_entry);
+                std::mem::swap(&mut put.1, &mut next);
+            }
+            self.put::<NEAREST>(bottom, put);
+        }
+        Some(next)
+    }
+
+    /// Puts one down among those above `bottom`, the nearest on top.
+    #[inline(always)]
+    fn put<const NEAREST: bool>(&mut self, bottom: usize, entry: (f32, u32)) {
+        let mut place = self.height;
+        while NEAREST && place > bottom {
+            // SAFETY: all from `bottom` to `height` are written by this function.
+            let below = unsafe { self.stack[(place - 1) & (STACK - 1)].assume_init() };
+            if below.0 >= entry.0 {
                 break;
             }
-            stack[place & (STACK - 1)].write(below);
+            self.stack[place & (STACK - 1)].write(below);
             place -= 1;
         }
-        stack[place & (STACK - 1)].write((entries[k], child[k]));
-        *height += 1;
+        self.stack[place & (STACK - 1)].write(entry);
+        self.height += 1;
     }
+}
+
+/// The row of boxes' planes that a ray comes to first along an axis.
+#[inline(always)]
+fn near_plane(inverse: Vec3, axis: usize) -> usize {
+    if inverse[axis] < 0.0 { axis + 3 } else { axis }
 }

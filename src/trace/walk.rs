@@ -8,6 +8,9 @@ use super::{
 use glam::Vec3;
 use std::mem::MaybeUninit;
 
+/// What an operation rounds by, relative.
+pub(super) const U: f32 = 1.0 / (1u32 << 24) as f32;
+
 /// Eight vectors side by side, by axis.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
@@ -202,6 +205,11 @@ pub(super) fn sub3<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
 #[inline(always)]
 pub(super) fn exact_dot<L: Lanes>(p: [L; 3], q: [L; 3]) -> L {
     p[0].mul(q[0]).add(p[1].mul(q[1])).add(p[2].mul(q[2]))
+}
+
+#[inline(always)]
+pub(super) fn exact_cross<L: Lanes>(p: [L; 3], q: [L; 3]) -> [L; 3] {
+    [p[1].mul(q[2]).sub(q[1].mul(p[2])), p[2].mul(q[0]).sub(q[2].mul(p[0])), p[0].mul(q[1]).sub(q[0].mul(p[1]))]
 }
 
 #[inline(always)]

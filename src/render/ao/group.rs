@@ -5,12 +5,12 @@
 use super::{Decided, Primary, Segment, Shading};
 use crate::{
     render::sampler::{Sampler, turn},
-    trace::{Packet, Segments},
+    trace::{Packet, Queue},
 };
 use pulp::{Arch, NullaryFnOnce};
 
 /// The most rays that go together.
-pub(super) const MOST: usize = 32;
+pub(super) const MOST: usize = Queue::MOST;
 
 /// Eight rays in the frame of a surface, side by side.
 #[derive(Clone, Copy)]
@@ -66,10 +66,9 @@ impl NullaryFnOnce for Draw<'_> {
 
 /// Secondary rays that wait for their walk.
 struct Waiting {
-    segments: [Segments; 4],
+    queue: Queue,
     /// Which primary ray each is of, and which of its secondary rays.
     of: [(u8, u8); MOST],
-    count: usize,
 }
 
 impl Shading<'_> {
@@ -92,7 +91,7 @@ impl Shading<'_> {
             *decided = Decided { hit, mu: f32::from(u8::from(!hit)), closed: 0, secondary_rays };
         }
         let Some(extension) = extension else { return };
-        let mut waiting = Waiting { segments: [Segments::EMPTY; 4], of: [(0, 0); MOST], count: 0 };
+        let mut waiting = Waiting { queue: Queue::default(), of: [(0, 0); MOST] };
         let [t, b] = self.frame;
         let mut open = all & !hit;
         while open != 0 {
@@ -110,7 +109,7 @@ impl Shading<'_> {
             let fan = self.fan(primary, self.ao.radius, shift, extension);
             for k in 0..secondary_rays {
                 waiting.push(i, k, &fan.segment(self, k, shift[1], extension));
-                if waiting.count == MOST {
+                if waiting.queue.is_full() {
                     self.close(&mut waiting, decided);
                 }
             }
@@ -131,20 +130,7 @@ impl Shading<'_> {
 
     /// Traces what waits.
     fn close(&self, waiting: &mut Waiting, decided: &mut [Decided]) {
-        let count = std::mem::take(&mut waiting.count);
-        if count == 0 {
-            return;
-        }
-        let packs = count.div_ceil(8);
-        waiting.segments[packs - 1].fill(count - 8 * (packs - 1));
-        let mask = u32::MAX >> (32 - count);
-        let [a, b, c, d] = waiting.segments;
-        let mut closed = match packs {
-            1 => self.tracer.occluded_segments(&[a], mask),
-            2 => self.tracer.occluded_segments(&[a, b], mask),
-            3 => self.tracer.occluded_segments(&[a, b, c, c], mask),
-            _ => self.tracer.occluded_segments(&[a, b, c, d], mask),
-        };
+        let mut closed = waiting.queue.occluded(self.tracer);
         while closed != 0 {
             let (i, k) = waiting.of[closed.trailing_zeros() as usize];
             closed &= closed - 1;
@@ -157,10 +143,8 @@ impl Waiting {
     #[inline]
     fn push(&mut self, i: usize, k: u32, segment: &Segment) {
         let Segment { middle, direction, back, forth } = *segment;
-        let at = self.count % MOST;
-        self.segments[at / 8].set(at % 8, middle - direction * back, direction, back + forth);
-        self.of[at] = (i as u8, k as u8);
-        self.count += 1;
+        self.of[self.queue.count() % MOST] = (i as u8, k as u8);
+        self.queue.push(middle - direction * back, direction, back + forth);
     }
 }
 
