@@ -60,6 +60,7 @@ impl Decided {
 
 /// Two unit tangents that make a right-handed frame with a unit normal (Duff et
 /// al., "Building an Orthonormal Basis, Revisited", JCGT 6(1), 2017).
+#[inline(always)]
 pub fn tangents(n: Vec3) -> [Vec3; 2] {
     let sign = if n.z >= 0.0 { 1.0 } else { -1.0 };
     let a = -1.0 / (sign + n.z);
@@ -69,6 +70,7 @@ pub fn tangents(n: Vec3) -> [Vec3; 2] {
 
 /// The cosine-distributed direction about a unit normal that two numbers in [0, 1)
 /// choose, and its cosine.
+#[inline(always)]
 pub fn cosine_distributed(normal: Vec3, [u, v]: [f32; 2]) -> (Vec3, f32) {
     let [cos_phi, sin_phi] = turn(v);
     let [t, b] = tangents(normal);

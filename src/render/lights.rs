@@ -68,12 +68,17 @@ impl Lights {
         Lights { punctual, ..Lights::default() }
     }
 
+    /// The openings that can be aimed at.
+    pub(super) fn portals(&self) -> &[Portal] {
+        &self.portals
+    }
+
     /// Whether any surface glows.
     pub fn has_emitters(&self) -> bool {
         !self.emitters.is_empty()
     }
 
-    /// A random point of a random portal, all portals alike.
+    /// A random point of a random portal, all portals alike. Twin: `path/portals.rs`.
     pub fn aim_at_portal(&self, origin: Vec3, place: impl FnOnce() -> [f32; 2]) -> Option<Aim> {
         if self.portals.is_empty() {
             return None;
@@ -103,21 +108,25 @@ impl Lights {
     /// Density per solid angle with which the two ways of aiming pick a direction
     /// that meets `hit` first: their sum, as the balance heuristic wants it
     /// (Veach 1997, section 9.2).
-    pub fn density(&self, tracer: &Tracer, origin: Vec3, direction: Vec3, hit: Option<&Hit>, emission: Vec3) -> f32 {
-        let at_emitter = match (hit, self.powers.last()) {
+    pub fn density(&self, origin: Vec3, direction: Vec3, hit: Option<&Hit>, emission: Vec3) -> f32 {
+        self.portal_density(origin, direction) + self.emitter_density(direction, hit, emission)
+    }
+
+    /// Density per solid angle with which [`Self::aim_at_emitter`] picks a direction
+    /// that meets `hit` first.
+    pub(super) fn emitter_density(&self, direction: Vec3, hit: Option<&Hit>, emission: Vec3) -> f32 {
+        match (hit, self.powers.last()) {
             (Some(hit), Some(&total)) if emission != Vec3::ZERO => {
-                let [a, b, c] = tracer.triangles()[hit.leaf as usize];
-                let cosine = (b - a).cross(c - a).normalize_or_zero().dot(direction).abs();
+                let cosine = hit.normal.dot(direction).abs();
                 let per_area = f64::from(luminance(emission.to_array())) / total;
                 if cosine > 0.0 { (per_area * f64::from(hit.t * hit.t / cosine)) as f32 } else { 0.0 }
             }
             _ => 0.0,
-        };
-        self.portal_density(origin, direction) + at_emitter
+        }
     }
 
     /// Density per solid angle with which [`Self::aim_at_portal`] picks a
-    /// direction.
+    /// direction. Twin: `path/portals.rs`.
     fn portal_density(&self, origin: Vec3, direction: Vec3) -> f32 {
         let mut density = 0.0;
         for p in &self.portals {

@@ -8,19 +8,27 @@
 //! light lies behind. All of this changes the noise, never the mean. Punctual
 //! lights can only be aimed at.
 
+mod batch;
+#[cfg(test)]
+mod one;
+mod portals;
+
 use super::{
     Geometry,
-    ao::cosine_distributed,
-    gbuffer::{FAR_AWAY, GBuffer, Surface},
-    lights::{Aim, lambert},
+    gbuffer::{FAR_AWAY, GBuffer},
+    lights::Aim,
     patience::Patience,
     sampler::Sampler,
 };
 use crate::trace::{Hit, Ray};
 use aogauge_scenes::luminance;
-use glam::Vec3;
+use batch::{MOST, Start};
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::f32::consts::PI;
+
+/// Neighbouring pixels whose paths go together.
+const PIXELS: usize = 32;
 
 /// Bounces before Russian roulette begins.
 const SURE_BOUNCES: u32 = 3;
@@ -65,69 +73,68 @@ pub(super) fn traced(
     [paths, seed, replicate]: [u32; 3],
     patience: &Patience<'_>,
 ) -> Vec<[f32; 3]> {
-    let pixel = |(pixel, surface): (usize, &Option<Surface>)| {
-        let skipped = patience.skips(pixel);
-        surface.as_ref().filter(|_| !skipped).map_or([f32::NAN; 3], |s| {
-            let sampler = Sampler::new(seed, pixel as u32, replicate);
-            let mut sum = glam::DVec3::ZERO;
-            for i in 0..paths {
-                sum += path(geometry, s.point, s.normal, &sampler, i).as_dvec3();
-                if patience.leaves(i) {
+    let mut colors = vec![[f32::NAN; 3]; gbuffer.surfaces.len()];
+    let chunks = colors.par_chunks_mut(PIXELS).zip(gbuffer.surfaces.par_chunks(PIXELS)).enumerate();
+    chunks.for_each(|(chunk, (colors, surfaces))| {
+        let first = chunk * PIXELS;
+        let mut batches = Batches::new(geometry);
+        let mut shaded = [false; PIXELS];
+        for (k, surface) in surfaces.iter().enumerate() {
+            let skipped = patience.skips(first + k);
+            let Some(s) = surface.as_ref().filter(|_| !skipped) else { continue };
+            shaded[k] = true;
+            let sampler = Sampler::new(seed, (first + k) as u32, replicate);
+            for sample in 0..paths {
+                batches.push(k, Start { point: s.point, normal: s.normal, sampler, sample });
+                if patience.leaves(sample) {
                     break;
                 }
             }
-            (sum / f64::from(paths)).as_vec3().to_array()
-        })
-    };
-    gbuffer.surfaces.par_iter().enumerate().with_min_len(32).map(pixel).collect()
+        }
+        let sums = batches.finish();
+        for (k, color) in colors.iter_mut().enumerate().filter(|(k, _)| shaded[*k]) {
+            *color = (sums[k] / f64::from(paths)).as_vec3().to_array();
+        }
+    });
+    colors
 }
 
-/// One path from a surface to the light: an estimate of irradiance over pi.
-fn path(geometry: &Geometry, point: Vec3, normal: Vec3, sampler: &Sampler, index: u32) -> Vec3 {
-    let Geometry { tracer, lights, .. } = geometry;
-    let (mut point, mut normal) = (point, normal);
-    let mut throughput = Vec3::ONE;
-    let mut sum = Vec3::ZERO;
-    for bounce in 0u32.. {
-        let origin = point + normal * tracer.offset();
-        let pair = |which: u32| sampler.pair(index, PAIRS * bounce + which);
-        // Random numbers cost hashes: they are drawn where something uses them.
-        let aims = [lights.aim_at_portal(origin, || pair(0)), lights.aim_at_emitter(origin, || pair(2))];
-        for aim in aims.into_iter().flatten() {
-            sum += throughput * aimed(geometry, origin, normal, aim);
-        }
-        if let Some(arrival) = lights.punctual(origin, || pair(3)[1]) {
-            sum += throughput * lambert(&arrival, tracer, origin, normal);
-        }
-        let (direction, cosine) = cosine_distributed(normal, pair(1));
-        let hit = tracer.closest(&Ray::new(origin, direction, FAR_AWAY));
-        let radiance = radiance(geometry, direction, hit.as_ref());
-        if radiance != Vec3::ZERO {
-            // The share that the bounce has in light which aiming could have found.
-            let own = cosine / PI;
-            let weight = own / (own + lights.density(tracer, origin, direction, hit.as_ref(), radiance));
-            sum += throughput * radiance * weight;
-        }
-        let Some(hit) = hit else {
-            return sum;
-        };
-        let albedo = geometry.albedo(hit.triangle);
-        throughput *= albedo;
-        let most = albedo.max_element();
-        if most <= 0.0 {
-            return sum;
-        }
-        if bounce >= SURE_BOUNCES {
-            // Below 1 even for an albedo near 1, so that every path ends.
-            let survival = most.min(0.95);
-            if pair(3)[0] >= survival {
-                return sum;
-            }
-            throughput /= survival;
-        }
-        (point, normal) = (hit.point, hit.normal);
+/// Paths of neighbouring pixels, traced as soon as there are enough to go side by side.
+struct Batches<'a> {
+    geometry: &'a Geometry,
+    starts: Vec<Start>,
+    /// Of which pixel each is.
+    of: [u8; MOST],
+    sums: [DVec3; PIXELS],
+}
+
+impl<'a> Batches<'a> {
+    fn new(geometry: &'a Geometry) -> Self {
+        Batches { geometry, starts: Vec::with_capacity(MOST), of: [0; MOST], sums: [DVec3::ZERO; PIXELS] }
     }
-    sum
+
+    fn push(&mut self, pixel: usize, start: Start) {
+        self.of[self.starts.len()] = pixel as u8;
+        self.starts.push(start);
+        if self.starts.len() == MOST {
+            self.trace();
+        }
+    }
+
+    /// The light of each pixel, summed in the order of its paths.
+    fn finish(mut self) -> [DVec3; PIXELS] {
+        self.trace();
+        self.sums
+    }
+
+    fn trace(&mut self) {
+        let mut light = [Vec3::ZERO; MOST];
+        batch::trace(self.geometry, &self.starts, &mut light);
+        for (light, &pixel) in light.iter().zip(&self.of[..self.starts.len()]) {
+            self.sums[usize::from(pixel)] += light.as_dvec3();
+        }
+        self.starts.clear();
+    }
 }
 
 /// Light along a way that was aimed, weighted against the other ways to find it.
@@ -151,7 +158,7 @@ fn aimed(geometry: &Geometry, origin: Vec3, normal: Vec3, aim: Aim) -> Vec3 {
         return Vec3::ZERO;
     }
     let radiance = radiance(geometry, aim.direction, hit.as_ref());
-    let aimed = lights.density(tracer, origin, aim.direction, hit.as_ref(), radiance);
+    let aimed = lights.density(origin, aim.direction, hit.as_ref(), radiance);
     if aimed <= 0.0 {
         return Vec3::ZERO;
     }
@@ -191,10 +198,18 @@ look = {{ eye = [1, 1, 1], target = [0, 0, 0], resolution = [16, 16] }}
         Geometry::new(&Scene::from_toml("test", "test.toml", &text, None).unwrap()).unwrap()
     }
 
+    /// A path from one point by each of `n` samplers.
+    fn paths(geometry: &Geometry, point: Vec3, normal: Vec3, n: u32) -> Vec<Vec3> {
+        let starts: Vec<_> =
+            (0..n).map(|i| Start { point, normal, sampler: Sampler::new(9, i, 0), sample: 0 }).collect();
+        let mut light = vec![Vec3::ZERO; starts.len()];
+        starts.chunks(MOST).zip(light.chunks_mut(MOST)).for_each(|(s, l)| batch::trace(geometry, s, l));
+        light
+    }
+
     fn mean(geometry: &Geometry, point: Vec3, normal: Vec3, n: u32) -> (f64, f64) {
-        let values: Vec<f64> = (0..n)
-            .map(|i| f64::from(luminance(path(geometry, point, normal, &Sampler::new(9, i, 0), 0).to_array())))
-            .collect();
+        let values: Vec<f64> =
+            paths(geometry, point, normal, n).iter().map(|l| f64::from(luminance(l.to_array()))).collect();
         let mean = values.iter().sum::<f64>() / f64::from(n);
         let var = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / f64::from(n - 1);
         (mean, (var / f64::from(n)).sqrt())
@@ -333,14 +348,13 @@ look = {{ eye = [1, 1, 1], target = [0, 0, 0], resolution = [16, 16] }}
             intensity: 30.0,
             range: None,
         }]);
-        let sampler = Sampler::new(3, 1, 4);
-        let light = path(&g, Vec3::ZERO, Vec3::Y, &sampler, 0);
+        let light = paths(&g, Vec3::ZERO, Vec3::Y, 1)[0];
         let expected = 30.0 * (2.0 / 5.0f32.sqrt()) / (5.0 * PI);
         for (value, share) in light.to_array().into_iter().zip([1.0, 0.5, 0.25]) {
             assert!((value - expected * share).abs() < 2e-4, "{light}");
         }
         // The ray from the light through the block's middle meets the floor here.
-        let shadow = path(&g, Vec3::new(1.0 + 1.0 * 2.0 / 1.45, 0.0, 0.0), Vec3::Y, &sampler, 0);
+        let shadow = paths(&g, Vec3::new(1.0 + 1.0 * 2.0 / 1.45, 0.0, 0.0), Vec3::Y, 1)[0];
         assert!(shadow.max_element() < 1e-6, "{shadow}");
     }
 
@@ -351,8 +365,7 @@ look = {{ eye = [1, 1, 1], target = [0, 0, 0], resolution = [16, 16] }}
         let walls = "[[object]]\nname = 'a'\ncolor = [0.8, 0.4, 0.1]\nemission = [0.1, 0.2, 0.3]\nshape = { block = { min = [-1, -1, -1], max = [1, 1, 1] } }";
         let g = lit(walls, "{}");
         let n = 20_000;
-        let paths: Vec<Vec3> =
-            (0..n).map(|i| path(&g, Vec3::new(0.2, -1.0, 0.3), Vec3::Y, &Sampler::new(9, i, 0), 0)).collect();
+        let paths = paths(&g, Vec3::new(0.2, -1.0, 0.3), Vec3::Y, n);
         for (c, (albedo, emission)) in [(0.8, 0.1), (0.4, 0.2), (0.1, 0.3)].into_iter().enumerate() {
             let values: Vec<f64> = paths.iter().map(|p| f64::from(p[c])).collect();
             let e = crate::stats::Estimate::of_mean(&values);

@@ -49,6 +49,9 @@ pub fn sobol(index: u32) -> [u32; 2] {
     [index.reverse_bits(), y.reverse_bits()]
 }
 
+/// What tells the scrambles of a pair's two numbers apart.
+const SALTS: [u32; 2] = [0x68bc_21eb, 0x02e5_be93];
+
 /// The random numbers of one pixel in one replicate.
 #[derive(Clone, Copy, Debug)]
 pub struct Sampler {
@@ -68,7 +71,7 @@ impl Sampler {
         let seed = combine(self.seed, dimension);
         let shuffled = owen_scramble(index, seed);
         let [x, y] = sobol(shuffled);
-        [owen_scramble(x, hash(seed ^ 0x68bc_21eb)), owen_scramble(y, hash(seed ^ 0x02e5_be93))]
+        [owen_scramble(x, hash(seed ^ SALTS[0])), owen_scramble(y, hash(seed ^ SALTS[1]))]
             .map(|v| (v >> 8) as f32 * 2.0f32.powi(-24))
     }
 
@@ -78,7 +81,7 @@ impl Sampler {
     #[allow(clippy::needless_range_loop)] // lanes
     pub(super) fn pairs(&self, first: u32, dimension: u32) -> [[f32; 8]; 2] {
         let seed = combine(self.seed, dimension);
-        let seeds = [hash(seed ^ 0x68bc_21eb), hash(seed ^ 0x02e5_be93)];
+        let seeds = SALTS.map(|salt| hash(seed ^ salt));
         let mut pairs = [[0.0; 8]; 2];
         for lane in 0..8 {
             let point = sobol(owen_scramble(first.wrapping_add(lane as u32), seed));
@@ -89,6 +92,26 @@ impl Sampler {
             }
         }
         pairs
+    }
+
+    /// [`Self::pair`] of the first `count` of many samplers, each at a sample of its own, side
+    /// by side like [`Self::pairs`]. The same bits.
+    #[inline(always)]
+    #[allow(clippy::needless_range_loop)] // lanes
+    pub(super) fn pairs_of<const N: usize>(
+        samplers: &[Sampler; N],
+        samples: &[u32; N],
+        count: usize,
+        dimension: u32,
+        [x, y]: &mut [[f32; N]; 2],
+    ) {
+        let salt = hash(dimension.wrapping_add(0x9e37_79b9));
+        for lane in 0..count.min(N) {
+            let seed = hash(samplers[lane].seed ^ salt);
+            let [a, b] = sobol(owen_scramble(samples[lane], seed));
+            x[lane] = (owen_scramble(a, hash(seed ^ SALTS[0])) >> 8) as i32 as f32 * 2.0f32.powi(-24);
+            y[lane] = (owen_scramble(b, hash(seed ^ SALTS[1])) >> 8) as i32 as f32 * 2.0f32.powi(-24);
+        }
     }
 }
 
