@@ -46,6 +46,7 @@ impl Hits {
 
 /// Of the rays in `mask`. Twin: `Tracer::hit`.
 #[inline(always)]
+#[allow(clippy::needless_range_loop)] // axes
 pub(super) fn closest<L: Lanes>(tracer: &Tracer, rays: &Segments, mask: u32) -> Hits {
     let nowhere = Packet([[0.0; 8]; 3]);
     let mut hits = Hits { met: 0, t: [0.0; 8], leaves: [0; 8], triangles: [0; 8], points: nowhere, normals: nowhere };

@@ -114,6 +114,7 @@ impl NullaryFnOnce for Draw<'_> {
     type Output = ();
 
     #[inline(always)]
+    #[allow(clippy::needless_range_loop)] // lanes
     fn call(self) {
         let Draw { batch: b, bounce, offset, aims, portals } = self;
         // Whole vectors; what lies past the last path is not looked at.

@@ -7,6 +7,7 @@ use aogauge_scenes::Portal;
 /// Unit directions from the first `count` origins to random points of random portals, and
 /// their cosines with the normals; 0 where there is no direction.
 #[inline(always)]
+#[allow(clippy::needless_range_loop)] // lanes
 pub(super) fn aim(
     portals: &[Portal],
     count: usize,
@@ -38,6 +39,8 @@ pub(super) fn aim(
 
 /// Densities per solid angle with which [`aim`] picks the first `count` directions.
 #[inline(always)]
+// Lanes; and without branches, which `contains` would bring.
+#[allow(clippy::needless_range_loop, clippy::manual_range_contains)]
 pub(super) fn densities(
     portals: &[Portal],
     count: usize,
