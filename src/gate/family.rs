@@ -148,8 +148,7 @@ impl<'a> Run<'a> {
         let mut lone = None;
         for record in self.parts.cases.iter().filter(|c| gate.applies_to(&c.case)) {
             if let Some(metric) = record.metric(gate.metric, gate.region) {
-                // Of one image that was handed in, no gate waits for another.
-                if gate.metric == MetricName::DistinctReplicates && is_lone(record) {
+                if self.cannot_be_known(gate.metric, record) {
                     lone = metric.note.clone();
                     continue;
                 }
@@ -179,6 +178,20 @@ impl<'a> Run<'a> {
             drafts.extend(missing(gate, &drafts));
         }
         Ok(drafts)
+    }
+
+    /// Whether what was handed in can never have a metric: one image has no other to differ from, an estimator that the
+    /// suite does not have no converged image. No gate waits for it.
+    fn cannot_be_known(&self, metric: MetricName, record: &CaseRecord) -> bool {
+        let is_lone = || record.source.as_ref().is_some_and(|s| s.intervals == Intervals::Tiles);
+        match metric {
+            _ if !self.handed_in => false,
+            MetricName::DistinctReplicates => is_lone(),
+            MetricName::Bias | MetricName::Mae | MetricName::Rmse => {
+                !self.parts.suite.methods.contains_key(&record.case.estimator)
+            }
+            _ => false,
+        }
     }
 
     fn draft(&self, gate: &'a Gate, scene: &'a str, case: Option<&'a CaseRecord>, metric: Metric) -> Draft<'a> {
@@ -244,11 +257,6 @@ impl<'a> Run<'a> {
         }
         verdict
     }
-}
-
-/// Whether a case is of one image that was handed in.
-fn is_lone(record: &CaseRecord) -> bool {
-    record.source.as_ref().is_some_and(|s| s.intervals == Intervals::Tiles)
 }
 
 /// A scene or an estimator that the gate names must not drop out of it unseen.

@@ -143,10 +143,13 @@ fn check_taken(
     let folder = folder.display();
     if handed.is_empty() {
         let scenes = scenes.join(", ");
-        let what = format!(
-            "{folder}: no image is called like a scene of the kit; names are SCENE.ESTIMATOR.RAYS.REPLICATE.exr, the scenes \
-             {scenes}"
-        );
+        let what = match not_taken {
+            0 => format!("{folder}: no image is called like a scene of the kit"),
+            n => format!(
+                "{folder}: none of {n} images is taken; an estimator that the kit does not have is named by --estimator"
+            ),
+        };
+        let what = format!("{what}; names are SCENE.ESTIMATOR.RAYS.REPLICATE.exr, the scenes {scenes}");
         return Err(ScoreError::Nothing(lines(what, why)));
     }
     if not_taken > 0 && !is_partial {

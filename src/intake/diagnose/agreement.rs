@@ -2,7 +2,7 @@
 
 use super::{
     Finding, Reference,
-    meaning::{DIFFERENT, SURE, left, undone},
+    meaning::{DIFFERENT, SURE, factor, left, undone},
 };
 use std::fmt;
 
@@ -22,19 +22,36 @@ pub struct Disagreement {
     pub rms: f64,
     /// Mean of the differences.
     pub mean: f64,
-    /// About how many times R is what was asked for, where that brings the image near.
-    pub factor: Option<f64>,
+    /// What brings the image near, if anything does.
+    pub cause: Option<Cause>,
+}
+
+/// What may make an image differ from its reference as a whole.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Cause {
+    /// R is about so many times what was asked for.
+    Radius(f64),
+    /// All values are so many times what is expected.
+    Gain(f64),
 }
 
 impl fmt::Display for Disagreement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Disagreement { rms, mean, factor } = self;
+        let Disagreement { rms, mean, cause } = self;
         write!(
             f,
             "it does not agree with what is expected: mean difference {mean:+.4}, root mean square {rms:.4} over blocks of \
-             {BLOCK} x {BLOCK} pixels; R or scale may be off"
+             {BLOCK} x {BLOCK} pixels; "
         )?;
-        factor.map_or(Ok(()), |factor| write!(f, ": R looks like {factor:.2} times what was asked for"))
+        match cause {
+            None => write!(f, "R or scale may be off"),
+            Some(Cause::Radius(factor)) => {
+                write!(f, "R or scale may be off: R looks like {factor:.2} times what was asked for")
+            }
+            Some(Cause::Gain(gain)) => {
+                write!(f, "exposure or intensity may be off: all looks like {gain:.2} times what is expected")
+            }
+        }
     }
 }
 
@@ -48,8 +65,12 @@ pub fn agreement(image: &[f32], reference: &Reference, size: [usize; 2], found: 
     let plain = found.iter().find_map(|f| undone(f, image));
     let [rms, mean] = differs(plain.as_deref().unwrap_or(image), &reference.openness, size[0])?;
     let without = left(image, &reference.openness, size[0])[0];
-    let other = radius(image, reference, size[0]).filter(|r| r.is_told() && r.left[0] < NAMED * without);
-    Some(Disagreement { rms, mean, factor: other.map(|r| r.factor) })
+    let other = radius(image, reference, size[0]).filter(Radius::is_told).map(|r| (Cause::Radius(r.factor), r.left[0]));
+    let gain = factor(image, &reference.openness);
+    let plain: Vec<f32> = image.iter().map(|v| v / gain as f32).collect();
+    let gain = (Cause::Gain(gain), left(&plain, &reference.openness, size[0])[0]);
+    let nearest = other.into_iter().chain([gain]).min_by(|a, b| a.1.total_cmp(&b.1));
+    Some(Disagreement { rms, mean, cause: nearest.filter(|(_, left)| *left < NAMED * without).map(|(cause, _)| cause) })
 }
 
 /// Root mean square, without noise, and mean of the differences of blocks, where they are worth an explanation.

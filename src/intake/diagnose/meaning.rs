@@ -104,16 +104,21 @@ fn strength(image: &[f32], reference: &Reference, width: usize) -> Option<Hypoth
     Some(Hypothesis { finding: Finding::Strength { strength }, left: left(&plain, reference, width) })
 }
 
-/// A factor on all values, by least squares: it needs less variety to be told than a curve does.
+/// The factor on all values of the reference that an image is nearest to, by least squares.
+pub(super) fn factor(image: &[f32], reference: &[f32]) -> f64 {
+    let known = image.iter().zip(reference).map(|(a, b)| [*a, *b].map(f64::from));
+    let known = known.filter(|p| p.iter().all(|v| v.is_finite()));
+    let (both, own) = known.fold((0.0, 0.0), |(both, own), [a, b]| (both + a * b, own + b * b));
+    both / own
+}
+
+/// A factor on all values: it needs less variety to be told than a curve does.
 fn gain(image: &[f32], reference: &Reference, width: usize) -> Option<Hypothesis> {
     let reference = &reference.openness;
     if Samples::new(image, reference).deviation() < BLENDED {
         return None;
     }
-    let known = image.iter().zip(reference).map(|(a, b)| [*a, *b].map(f64::from));
-    let known = known.filter(|p| p.iter().all(|v| v.is_finite()));
-    let (both, own) = known.fold((0.0, 0.0), |(both, own), [a, b]| (both + a * b, own + b * b));
-    let gain = both / own;
+    let gain = factor(image, reference);
     if !STRENGTHS.contains(&gain) || gain.max(1.0 / gain) < GAINED {
         return None;
     }

@@ -14,7 +14,7 @@ mod shift;
 #[cfg(test)]
 mod tests;
 
-pub use agreement::{Disagreement, agreement};
+pub use agreement::{Cause, Disagreement, agreement};
 pub use place::{Turn, alike};
 
 use crate::metrics::regions::{Region, Regions};
@@ -364,11 +364,12 @@ impl Finding {
                  `curve = {{ gain = {gain:.2}, exponent = {exponent:.2} }}`"
             ),
             Finding::Scaled { factors } => {
-                let factor = factors.first().copied().unwrap_or(1.0);
+                let all =
+                    |f: &dyn Fn(f64) -> f64| factors.iter().map(|v| written(f(*v))).collect::<Vec<_>>().join(" or ");
                 format!(
                     "one unit of the glb is a metre, and R is in metres: multiply the radius by {}, or the scene by {}",
-                    written(1.0 / factor),
-                    written(factor)
+                    all(&|v| 1.0 / v),
+                    all(&|v| v)
                 )
             }
             Finding::Between { .. } => {

@@ -190,7 +190,19 @@ fn own_gates_and_own_estimators() {
     let bias = own.metric(MetricName::Bias, Some(Region::All)).unwrap();
     assert!(bias.value.is_none() && bias.note.as_ref().unwrap().contains("no estimator 'my-ao'"), "{bias:?}");
     assert!(!record.suite.methods.contains_key("my-ao"));
+    // A gate on what can never be known of it waits for nothing.
+    let bias = "[[gate]]\nname = 'bias'\nmetric = 'bias'\nregion = 'all'\nequals = 0.0\nwithin = 0.1\n";
+    let open = "[[gate]]\nname = 'open'\nmetric = 'openness'\nregion = 'all'\nmin = 0.01\n";
+    fs::write(&gates, [bias, open].concat()).unwrap();
+    let (code, text) = images.score(&options);
+    assert!(code == 0 && text.contains("no estimator 'my-ao'"), "{code}: {text}");
     fs::remove_file(gates).unwrap();
+    // The name that is not taken is what is wrong.
+    let (replicates, size) = Images::of("corner", "classic");
+    let other = Images::new();
+    other.exr("corner.my-ao.4.0000.exr", &replicates[0], size);
+    let (code, text) = other.score(&[]);
+    assert!(code == 4 && text.contains("none of 1 images is taken") && text.contains("--estimator"), "{code}: {text}");
 }
 
 /// A gate that no scene of the kit could ever be held against is a mistake.

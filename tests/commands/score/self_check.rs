@@ -108,6 +108,10 @@ fn another_radius_does_not_agree() {
     images.self_check(|image, _| image.iter().map(|v| 1.0 - 0.7 * (1.0 - v)).collect());
     let (code, text) = images.score(&[]);
     assert!(code == 0 && text.contains("AO of strength 0.7"), "{code}: {text}");
+    // Less than a curve is worth the name, and no R.
+    images.self_check(|image, _| image.iter().map(|v| 0.9 * v).collect());
+    let (code, text) = images.score(&[]);
+    assert!(code == 5 && text.contains("all looks like 0.90 times what is expected"), "{code}: {text}");
 }
 
 /// What is declared and is wrong is not told to be declared.
