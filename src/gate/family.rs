@@ -145,11 +145,11 @@ impl<'a> Run<'a> {
             };
             drafts.push(self.draft(gate, &scene.name, None, metric));
         }
-        let mut lone = None;
+        let mut unknown = None;
         for record in self.parts.cases.iter().filter(|c| gate.applies_to(&c.case)) {
             if let Some(metric) = record.metric(gate.metric, gate.region) {
                 if self.cannot_be_known(gate.metric, record) {
-                    lone = metric.note.clone();
+                    unknown = metric.note.clone();
                     continue;
                 }
                 drafts.push(self.draft(gate, &record.case.scene, Some(record), metric.clone()));
@@ -159,7 +159,7 @@ impl<'a> Run<'a> {
             return Err(match self.filter {
                 Some(filter) => idle(format!("no case that was asked for (--filter {filter}) has this metric"), true),
                 None if self.handed_in => {
-                    idle(lone.unwrap_or_else(|| "nothing that was handed in has this metric".to_owned()), true)
+                    idle(unknown.unwrap_or_else(|| "nothing that was handed in has this metric".to_owned()), true)
                 }
                 None => idle("no case of this run has this metric".to_owned(), false),
             });
@@ -183,15 +183,10 @@ impl<'a> Run<'a> {
     /// Whether what was handed in can never have a metric: one image has no other to differ from, an estimator that the
     /// suite does not have no converged image. No gate waits for it.
     fn cannot_be_known(&self, metric: MetricName, record: &CaseRecord) -> bool {
-        let is_lone = || record.source.as_ref().is_some_and(|s| s.intervals == Intervals::Tiles);
-        match metric {
-            _ if !self.handed_in => false,
-            MetricName::DistinctReplicates => is_lone(),
-            MetricName::Bias | MetricName::Mae | MetricName::Rmse => {
-                !self.parts.suite.methods.contains_key(&record.case.estimator)
-            }
-            _ => false,
-        }
+        let Some(source) = record.source.as_ref().filter(|_| self.handed_in) else { return false };
+        let is_foreign = !self.parts.suite.methods.contains_key(&record.case.estimator);
+        metric == MetricName::DistinctReplicates && source.intervals == Intervals::Tiles
+            || metric.is_against_converged() && is_foreign
     }
 
     fn draft(&self, gate: &'a Gate, scene: &'a str, case: Option<&'a CaseRecord>, metric: Metric) -> Draft<'a> {

@@ -43,7 +43,7 @@ pub(super) fn picture(metric: &Metric, scene: &SceneRecord, case: Option<&CaseRe
     match metric.name {
         MetricName::Contrast | MetricName::Michelson => Some(pictures::profile(&scene.name)),
         MetricName::ContrastError | MetricName::Removed if judged => of(pictures::MINUS_Q),
-        MetricName::Bias | MetricName::Mae | MetricName::Rmse if judged => of(pictures::MINUS_CONVERGED),
+        name if judged && name.is_against_converged() => of(pictures::MINUS_CONVERGED),
         // No picture of a report shows what is below one grey level.
         MetricName::RendererDifference | MetricName::DistinctReplicates => image.clone(),
         _ => of(pictures::MEASURE),

@@ -79,6 +79,11 @@ impl MetricName {
             MetricName::DistinctReplicates => "distinct-replicates",
         }
     }
+
+    /// Whether it is an error against the converged image of the same estimator.
+    pub fn is_against_converged(self) -> bool {
+        matches!(self, MetricName::Bias | MetricName::Mae | MetricName::Rmse)
+    }
 }
 
 /// One number of one case, or why there is none.

@@ -47,21 +47,20 @@ fn curve(label: &str, columns: impl Iterator<Item = Estimate>) -> Curve {
 
 /// The profile of a method: the mean of each column over rows and replicates.
 pub fn of_method(label: &str, replicates: &[Vec<f32>], width: usize) -> Curve {
-    curve(
-        label,
-        (0..width).map(|c| {
-            Estimate::of_mean(&replicates.iter().map(|image| column_mean(image, width, c)).collect::<Vec<_>>())
-        }),
-    )
+    curve(label, columns(replicates, width, 1.0))
 }
 
 /// The profile of whole frames: their light over `flank`, its mean over the brighter flank, above 0.
 pub fn of_frames(label: &str, replicates: &[Vec<f32>], width: usize, flank: f64) -> Curve {
-    let columns = (0..width).map(|c| {
-        let light: Vec<f64> = replicates.iter().map(|image| column_mean(image, width, c) / flank).collect();
-        Estimate::of_mean(&light)
-    });
-    Curve { light: true, ..curve(label, columns) }
+    Curve { light: true, ..curve(label, columns(replicates, width, flank)) }
+}
+
+/// The means of columns over rows and replicates, in a unit.
+fn columns(replicates: &[Vec<f32>], width: usize, unit: f64) -> impl Iterator<Item = Estimate> {
+    (0..width).map(move |c| {
+        let means: Vec<f64> = replicates.iter().map(|image| column_mean(image, width, c) / unit).collect();
+        Estimate::of_mean(&means)
+    })
 }
 
 /// The profile of Q: each column's ratio of mean irradiances.

@@ -78,7 +78,7 @@ impl Subject<'_> {
         }
         let judged = self.judge(folder, rendered)?;
         let cases = self.case_records(rendered, &judged, counts);
-        let scene = self.scene_record(folder, rendered, &judged, counts)?;
+        let scene = self.scene_record(folder, rendered, &judged, counts, self.profiles(rendered, counts))?;
         Ok((Some(scene), cases))
     }
 

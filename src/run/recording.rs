@@ -15,7 +15,7 @@ use crate::{
         Absent,
         convergence::{Convergence, Level, convergence},
         judge::Judge,
-        profile,
+        profile::{self, Curve},
         regions::Region,
     },
     record::{RecordFolder, SceneRecord},
@@ -24,17 +24,17 @@ use crate::{
 use std::collections::BTreeMap;
 
 impl Subject<'_> {
-    /// What is found of the scene, with its images, which are written.
+    /// What is found of the scene, with its images, which are written, and the `profiles` of methods.
     pub(super) fn scene_record(
         &self,
         folder: &RecordFolder,
         rendered: &Rendered,
         judged: &Result<Judged, Unjudged>,
         counts: &Counts,
+        profiles: Vec<Curve>,
     ) -> Result<SceneRecord, RunError> {
         let methods = &self.plan.suite.methods;
         let pixels = self.facts.pixels();
-        let width = self.facts.resolution[0];
         let mut layers = Layers::new(self.facts.resolution);
         for region in Region::ALL {
             layers = layers.with(&format!("region-{}", region.label()), self.regions.mask(region, pixels));
@@ -44,21 +44,25 @@ impl Subject<'_> {
         }
         let mut scene = self.scene_facts(rendered, judged);
         layers.write(&folder.path().join(&scene.image))?;
-        let most = |method: usize| {
-            let own = methods[method].rays;
-            own.or_else(|| self.plan.suite.file.rays.iter().copied().max()).map_or(0, Rays::get)
-        };
-        // Images that were handed in are of one renderer of their own.
-        let is_on_cpu = self.cases().any(|c| c.renderer == "cpu");
-        let renderer = if is_on_cpu { "cpu" } else { self.cases().next().map_or("", |c| &c.renderer) };
-        scene.profiles = self
-            .cases()
-            .filter(|c| c.renderer == renderer && c.rays == most(self.method(c)))
-            .filter_map(|c| Some(profile::of_method(&c.estimator, rendered.replicates(c, counts)?, width as usize)))
-            .collect();
+        scene.profiles = profiles;
         scene.profiles.extend(judged.as_ref().ok().map(|j| j.curve.clone()));
         scene.convergence = self.convergence(rendered, counts);
         Ok(scene)
+    }
+
+    /// Openness along the transect of each method at the most rays, on the CPU where there are such cases.
+    pub(super) fn profiles(&self, rendered: &Rendered, counts: &Counts) -> Vec<Curve> {
+        let width = self.facts.resolution[0] as usize;
+        let most = |method: usize| {
+            let own = self.plan.suite.methods[method].rays;
+            own.or_else(|| self.plan.suite.file.rays.iter().copied().max()).map_or(0, Rays::get)
+        };
+        let is_on_cpu = self.cases().any(|c| c.renderer == "cpu");
+        let renderer = if is_on_cpu { "cpu" } else { self.cases().next().map_or("", |c| &c.renderer) };
+        self.cases()
+            .filter(|c| c.renderer == renderer && c.rays == most(self.method(c)))
+            .filter_map(|c| Some(profile::of_method(&c.estimator, rendered.replicates(c, counts)?, width)))
+            .collect()
     }
 
     /// What is known of the scene before its cases are: all but its profiles and how methods

@@ -19,7 +19,7 @@ use crate::{
     metrics::{
         Absent, Metric, MetricName,
         artifact::{Converged, Method as Measured},
-        judge::{Judge, JudgedRegions, vague},
+        judge::{JudgedRegions, vague},
         profile::{self, Curve},
         regions::{Region, Regions},
         tiles,
@@ -46,9 +46,14 @@ pub struct CaseImages {
 }
 
 impl CaseImages {
+    /// What they show; openness where there are no files.
+    pub fn shows(&self) -> Shows {
+        self.source.as_ref().map_or(Shows::Openness, |s| s.shows)
+    }
+
     /// Whether they show openness alone.
     pub fn is_openness(&self) -> bool {
-        self.source.as_ref().is_none_or(|s| s.shows == Shows::Openness)
+        self.shows() == Shows::Openness
     }
 }
 
@@ -156,10 +161,8 @@ impl Ready<'_> {
             }
             scored.note(&mut rendered);
             references.look(scene).map_err(RunError::Kit)?.write(&folder.path().join(look_image(&scene.facts.name)))?;
-            let mut scene = subject.scene_record(folder, &rendered, &judged, &Counts::all(u32::MAX))?;
-            scene.profiles.retain(|c| c.label == Judge::LABEL);
-            scene.profiles.splice(0..0, scored.profiles());
-            scenes.push(scene);
+            let counts = Counts::all(u32::MAX);
+            scenes.push(subject.scene_record(folder, &rendered, &judged, &counts, scored.profiles())?);
         }
         let gpu = format!("none was used: the images were handed in, of the renderer '{}'", by.renderer);
         let mut info = super::suite_info(&plan);
@@ -239,7 +242,7 @@ impl Scored<'_> {
             Err(why) => return failed(why.clone()),
         };
         let index = self.subject.method(&handed.case);
-        let shows = handed.source.as_ref().map_or(Shows::Openness, |s| s.shows);
+        let shows = handed.shows();
         let all = self.subject.regions(index);
         let known = match self.known(all, images, shows) {
             Ok(known) => known,
@@ -337,7 +340,7 @@ impl Scored<'_> {
             return method.contrasts().to_vec();
         }
         let index = self.subject.method(case);
-        let is_classic = self.subject.plan.suite.methods[self.subject.plan.suite.classic()].name == case.estimator;
+        let is_classic = self.subject.plan.suite.is_classic(&case.estimator);
         let beside = if is_classic { None } else { self.classic_on(case, images.len(), regions, rendered) };
         let lacks_classic = beside.is_none() && !is_classic;
         let others = Others {
@@ -355,7 +358,7 @@ impl Scored<'_> {
         if !rendered.truths.contains_key(&index) {
             let why = format!("the suite has no estimator '{}', so there is no converged image of it", case.estimator);
             for m in &mut metrics {
-                if matches!(m.name, MetricName::Bias | MetricName::Mae | MetricName::Rmse) {
+                if m.name.is_against_converged() {
                     *m = Metric::new(m.name, m.region, Err(Absent(why.clone())));
                 }
             }
@@ -404,16 +407,14 @@ impl Scored<'_> {
 
     /// What was handed in along the transect, of each estimator the case of the most rays.
     fn profiles(&self) -> Vec<Curve> {
-        let rays = |h: &CaseImages| h.images.as_ref().map_or(0, |_| h.case.rays);
-        let most = |h: &CaseImages| {
-            let own = self.handed.iter().filter(|o| o.case.estimator == h.case.estimator);
-            own.map(|o| rays(o)).max().unwrap_or(0)
+        let usable = || self.handed.iter().filter(|h| h.images.is_ok());
+        let has_most = |h: &CaseImages| {
+            usable().filter(|o| o.case.estimator == h.case.estimator).all(|o| o.case.rays <= h.case.rays)
         };
         let width = self.subject.facts.resolution[0] as usize;
         let of = |h: &&CaseImages| {
             let (images, label) = (h.images.as_ref().ok()?, &h.case.estimator);
-            let shows = h.source.as_ref().map_or(Shows::Openness, |s| s.shows);
-            if shows != Shows::Frame {
+            if h.shows() != Shows::Frame {
                 return Some(profile::of_method(label, images, width));
             }
             let regions = self.subject.regions(self.subject.method(&h.case));
@@ -424,7 +425,7 @@ impl Scored<'_> {
             let flank = flank(Region::Left).max(flank(Region::Right));
             (flank > 0.0).then(|| profile::of_frames(label, images, width, flank))
         };
-        self.handed.iter().filter(|h| h.images.is_ok() && h.case.rays == most(h)).filter_map(of).collect()
+        usable().filter(|h| has_most(h)).filter_map(of).collect()
     }
 
     /// Puts images of openness where convergence is taken from.

@@ -187,7 +187,7 @@ impl Reader<'_> {
         let Some(scene) = self.references.scene(&case.case.scene) else { return Ok(()) };
         let reference = self.reference(&case.case.scene, &case.case.estimator)?;
         let size = scene.facts.resolution.map(|side| side as usize);
-        let shows = case.source.as_ref().map_or(Shows::Openness, |s| s.shows);
+        let shows = case.shows();
         let light = if shows == Shows::Frame { self.references.light(scene)? } else { None };
         let mut found = Diagnosis::default();
         for (number, image) in images.iter().enumerate() {
@@ -195,7 +195,11 @@ impl Reader<'_> {
                 Shows::Frame => of_frame(image, &reference, light.as_deref(), size),
                 _ => self.of_openness(image, &reference, size, shows),
             };
-            own.doubtful.extend(self.apart(image, case, &reference, &own, size));
+            // What is doubtful is so in all of them.
+            match number {
+                0 => own.doubtful.extend(self.apart(image, case, &reference, &own, size)),
+                _ => own.doubtful.clear(),
+            }
             if shows != Shows::Frame
                 && let Some(other) = self.rather(image, case, &reference)?
             {
@@ -205,8 +209,7 @@ impl Reader<'_> {
                 own.doubtful.clear();
             }
             found.wrong.extend(own.wrong.into_iter().map(|w| format!("image {number}: {w}")));
-            // What is doubtful is so in all of them.
-            found.doubtful.extend(own.doubtful.into_iter().filter(|_| number == 0));
+            found.doubtful.extend(own.doubtful);
             if !found.wrong.is_empty() {
                 break;
             }
@@ -257,8 +260,7 @@ impl Reader<'_> {
         own: &Diagnosis,
         size: [usize; 2],
     ) -> Option<String> {
-        let suite = self.references.suite();
-        let is_classic = suite.methods[suite.classic()].name == case.case.estimator;
+        let is_classic = self.references.suite().is_classic(&case.case.estimator);
         if !is_classic || self.is_declared || !case.is_openness() || !own.findings.is_empty() {
             return None;
         }

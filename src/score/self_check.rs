@@ -49,8 +49,6 @@ pub(super) fn check(reader: &Reader<'_>, curve: Option<Curve>, handed: &[Handed]
     let (reference, resolution) = read(reader.references)?;
     let size = resolution.map(|side| side as usize);
     let mut warnings = Vec::new();
-    let suite = reader.references.suite();
-    let classic = &suite.methods[suite.classic()].name;
     for (of, image) in handed.iter().flat_map(|h| h.images.iter().map(move |i| (&h.estimator, i))) {
         let wrong = |why: String| ScoreError::SelfCheck(format!("{}: {why}", name_of(image)));
         let read = reader.image(image, of, resolution, &reference).map_err(|e| match e {
@@ -71,7 +69,7 @@ pub(super) fn check(reader: &Reader<'_>, curve: Option<Curve>, handed: &[Handed]
             }
             // What is expected is classic AO; a curve that is yet to be fitted is no disagreement.
             if shows != Shows::Frame
-                && of == classic
+                && reader.references.suite().is_classic(of)
                 && !reader.is_declared
                 && let Some(apart) = intake::agreement(values, &reference, size, &found.findings)
             {

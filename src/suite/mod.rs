@@ -205,6 +205,11 @@ impl Suite {
     pub fn classic(&self) -> usize {
         self.methods.iter().position(Method::is_classic).unwrap_or(0)
     }
+
+    /// Whether an estimator is that method, by its name.
+    pub fn is_classic(&self, estimator: &str) -> bool {
+        self.methods[self.classic()].name == estimator
+    }
 }
 
 /// The methods and gates of a suite file, checked against each other and the names of its

@@ -87,42 +87,44 @@ pub(super) fn is_rather(image: &[f32], reference: &[f32], other: &[f32], width: 
     is_different(without) && explains(left(image, other, width), without)
 }
 
-/// AO that was blended with white: occlusion times a factor, by least squares.
+/// AO that was blended with white: a factor on occlusion.
 fn strength(image: &[f32], reference: &Reference, width: usize) -> Option<Hypothesis> {
-    let reference = &reference.openness;
-    if Samples::new(image, reference).deviation() < BLENDED {
-        return None;
-    }
-    let pairs = image.iter().zip(reference).map(|(a, b)| [1.0 - f64::from(*a), 1.0 - f64::from(*b)]);
-    let known = pairs.filter(|p| p.iter().all(|v| v.is_finite()));
-    let (both, own) = known.fold((0.0, 0.0), |(both, own), [a, b]| (both + a * b, own + b * b));
-    let strength = both / own;
-    if !STRENGTHS.contains(&strength) || strength.max(1.0 / strength) < GAINED {
-        return None;
-    }
-    let plain: Vec<f32> = image.iter().map(|v| 1.0 - (1.0 - v) / strength as f32).collect();
-    Some(Hypothesis { finding: Finding::Strength { strength }, left: left(&plain, reference, width) })
+    let strength = proportion(image, &reference.openness, |v| 1.0 - v);
+    by_one_number(image, reference, width, strength, Finding::Strength { strength })
+}
+
+/// A factor on openness: it needs less variety to be told than a curve does.
+fn gain(image: &[f32], reference: &Reference, width: usize) -> Option<Hypothesis> {
+    let gain = factor(image, &reference.openness);
+    by_one_number(image, reference, width, gain, Finding::Curve { gain, exponent: 1.0 })
 }
 
 /// The factor on all values of the reference that an image is nearest to, by least squares.
 pub(super) fn factor(image: &[f32], reference: &[f32]) -> f64 {
-    let known = image.iter().zip(reference).map(|(a, b)| [*a, *b].map(f64::from));
-    let known = known.filter(|p| p.iter().all(|v| v.is_finite()));
+    proportion(image, reference, |v| v)
+}
+
+/// The factor between what `of` makes of reference and image, by least squares.
+fn proportion(image: &[f32], reference: &[f32], of: fn(f64) -> f64) -> f64 {
+    let pairs = image.iter().zip(reference).map(|(a, b)| [*a, *b].map(|v| of(f64::from(v))));
+    let known = pairs.filter(|p| p.iter().all(|v| v.is_finite()));
     let (both, own) = known.fold((0.0, 0.0), |(both, own), [a, b]| (both + a * b, own + b * b));
     both / own
 }
 
-/// A factor on all values: it needs less variety to be told than a curve does.
-fn gain(image: &[f32], reference: &Reference, width: usize) -> Option<Hypothesis> {
+/// What a finding of one free number leaves, where scene and number are such that it can be told.
+fn by_one_number(
+    image: &[f32],
+    reference: &Reference,
+    width: usize,
+    number: f64,
+    finding: Finding,
+) -> Option<Hypothesis> {
     let reference = &reference.openness;
-    if Samples::new(image, reference).deviation() < BLENDED {
+    let is_even = Samples::new(image, reference).deviation() < BLENDED;
+    if is_even || !STRENGTHS.contains(&number) || number.max(1.0 / number) < GAINED {
         return None;
     }
-    let gain = factor(image, reference);
-    if !STRENGTHS.contains(&gain) || gain.max(1.0 / gain) < GAINED {
-        return None;
-    }
-    let finding = Finding::Curve { gain, exponent: 1.0 };
     let left = left(&undone(&finding, image)?, reference, width);
     Some(Hypothesis { finding, left })
 }

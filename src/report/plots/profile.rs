@@ -119,10 +119,10 @@ pub fn profile(estimators: &[String], scene: &SceneRecord, ranges: &Ranges) -> R
         let (style, width) = look(curve);
         draw(&mut sheet, &frame, scene, curve, (style, width, i));
     }
-    let what = match along(&scene.profiles) {
-        "openness" => "openness O",
-        "light" => "light / flank",
-        _ => "O, light / flank",
+    let what = match shown(&scene.profiles) {
+        [_, false] => "openness O",
+        [false, true] => "light / flank",
+        [true, true] => "O, light / flank",
     };
     let judge = if scene.judge.is_some() { ", occlusion ratio Q" } else { "" };
     frame.axes(&mut sheet, "place t / R along the transect", &format!("{what}{judge}"));
@@ -131,12 +131,16 @@ pub fn profile(estimators: &[String], scene: &SceneRecord, ranges: &Ranges) -> R
 
 /// What the curves of methods are, in a word or two.
 pub fn along(curves: &[Curve]) -> &'static str {
-    let of = |light: bool| curves.iter().any(|c| c.label != Judge::LABEL && c.light == light);
-    match (of(false), of(true)) {
-        (_, false) => "openness",
-        (false, true) => "light",
-        (true, true) => "openness and light",
+    match shown(curves) {
+        [_, false] => "openness",
+        [false, true] => "light",
+        [true, true] => "openness and light",
     }
+}
+
+/// Whether any curve of a method is openness, and whether any is light.
+fn shown(curves: &[Curve]) -> [bool; 2] {
+    [false, true].map(|light| curves.iter().any(|c| c.label != Judge::LABEL && c.light == light))
 }
 
 /// Band, curve and markers, a piece between holes at a time.
