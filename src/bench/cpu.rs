@@ -12,7 +12,7 @@ use crate::{
         sampler::Sampler,
     },
     scenes::{Scene, View},
-    trace::{Fan, Packet, Ray, Segments, Tracer},
+    trace::{Faces, Fan, Packet, Ray, Segments, Tracer},
 };
 use glam::Vec3;
 use race::{Course, Side, race};
@@ -273,7 +273,8 @@ impl<'a> Machine<'a> {
         for (name, tracer) in self.own() {
             let run = move |points: Range<usize>, out: &mut [u8]| {
                 for (i, out) in points.zip(out.chunks_mut(packs)) {
-                    let fan = Fan { origin: rays.origins[i], normal: rays.points[i].normal, tmax };
+                    let (origin, normal) = (rays.origins[i], rays.points[i].normal);
+                    let fan = Fan { origin, normal, tmax, faces: Faces::Both };
                     let packets = &rays.packets[i * packs..];
                     let met = match packs {
                         1 => tracer.occluded_from(&fan, &[packets[0]], 0xff),
@@ -304,7 +305,7 @@ impl<'a> Machine<'a> {
         for (name, tracer) in self.own() {
             let run = move |points: Range<usize>, out: &mut [u8]| {
                 for (i, out) in points.zip(out.chunks_mut(2)) {
-                    let met = tracer.occluded_segments(&[segments[2 * i], segments[2 * i + 1]], 0xffff);
+                    let met = tracer.occluded_segments(&[segments[2 * i], segments[2 * i + 1]], 0xffff, Faces::Both);
                     out.copy_from_slice(&met.to_le_bytes()[..2]);
                 }
             };

@@ -78,13 +78,6 @@ pub fn cosine_distributed(normal: Vec3, [u, v]: [f32; 2]) -> (Vec3, f32) {
     ((t * cos_phi + b * sin_phi) * u.sqrt() + normal * cosine, cosine)
 }
 
-/// Whether a triangle turns its front, from where its corners run
-/// counter-clockwise, against a direction.
-fn faces(corners: &[Vec3; 3], direction: Vec3) -> bool {
-    let [a, b, c] = corners;
-    (*b - *a).cross(*c - *a).dot(direction) < 0.0
-}
-
 /// A shaded point with what its rays share.
 #[derive(Clone, Copy, Debug)]
 pub struct Shading<'a> {
@@ -171,37 +164,22 @@ impl<'a> Shading<'a> {
         let falloff = self.method.falloff;
         let ray = Ray::new(self.origin, w, self.method.reach(radius));
         if falloff == Falloff::Step {
-            let hit = self.occluded(&ray);
+            let hit = self.tracer.occluded_by(&ray, self.method.faces);
             return (hit, f32::from(u8::from(!hit)), radius);
         }
-        let distance = match self.method.faces {
-            Faces::Both => self.tracer.distance(&ray),
-            Faces::Front => self.tracer.scalar().distance_by(&ray, |corners| faces(corners, w)),
-        };
+        let distance = self.tracer.distance(&ray, self.method.faces);
         distance.map_or((false, 1.0, radius), |d| (true, falloff.mu(d, radius), d.min(radius)))
     }
 
-    #[inline]
-    fn occluded(&self, ray: &Ray) -> bool {
-        match self.method.faces {
-            Faces::Both => self.tracer.occluded(ray),
-            Faces::Front => self.tracer.scalar().occluded_by(ray, |corners| faces(corners, ray.direction)),
-        }
-    }
-
-    /// Whether a secondary ray is closed. Where back faces are culled it is two
-    /// rays, each away from the primary one: what faces a point is its front
-    /// whichever way the segment is walked.
+    /// Whether a secondary ray is closed.
     #[inline]
     fn closed(&self, segment: &Segment) -> bool {
-        let Segment { middle, direction, back, forth } = *segment;
-        match self.method.faces {
-            Faces::Both => self.occluded(&Ray::new(middle - direction * back, direction, back + forth)),
-            Faces::Front => {
-                self.occluded(&Ray::new(middle, direction, forth))
-                    || (back > 0.0 && self.occluded(&Ray::new(middle, -direction, back)))
-            }
-        }
+        let faces = self.method.faces;
+        let mut closed = false;
+        segment.rays(faces, |origin, direction, length| {
+            closed = closed || self.tracer.occluded_by(&Ray::new(origin, direction, length), faces);
+        });
+        closed
     }
 
     /// Openness over `rays` rays, and how each was decided.
@@ -226,7 +204,7 @@ impl<'a> Shading<'a> {
 
     /// Decides samples `first` and following.
     fn decide_all(&self, first: u32, sampler: &Sampler, decided: &mut [Decided]) {
-        if self.method.falloff == Falloff::Step && self.method.faces == Faces::Both {
+        if self.method.falloff == Falloff::Step {
             return self.decide_together(first, sampler, decided);
         }
         for (i, decided) in decided.iter_mut().enumerate() {
@@ -273,6 +251,25 @@ struct Segment {
     direction: Vec3,
     back: f32,
     forth: f32,
+}
+
+impl Segment {
+    /// The rays that close it: their origins, directions and lengths. Where back faces are
+    /// culled there are two, each away from the primary one: what faces a point is its
+    /// front whichever way the segment is walked.
+    #[inline(always)]
+    fn rays(&self, faces: Faces, mut each: impl FnMut(Vec3, Vec3, f32)) {
+        let Segment { middle, direction, back, forth } = *self;
+        match faces {
+            Faces::Both => each(middle - direction * back, direction, back + forth),
+            Faces::Front => {
+                each(middle, direction, forth);
+                if back > 0.0 {
+                    each(middle, -direction, back);
+                }
+            }
+        }
+    }
 }
 
 impl Fan {

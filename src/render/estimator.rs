@@ -5,6 +5,7 @@ use super::{
     screen_space::{Integral, ScreenSpace},
     smoothing::Smoothing,
 };
+pub use crate::trace::Faces;
 use aogauge_scenes::AoScale;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -152,18 +153,6 @@ impl Falloff {
             }
         }
     }
-}
-
-/// Which side of a triangle closes a ray.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Faces {
-    /// Both.
-    #[default]
-    Both,
-    /// The one whose corners run counter-clockwise: back faces are culled, as in
-    /// Unity.
-    Front,
 }
 
 /// The secondary rays of the paper's section 5, and ways to vary them.

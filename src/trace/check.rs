@@ -1,8 +1,8 @@
 //! Every answer of the wide walks against the scalar one: cosine distributed rays, rays
-//! along edges and at corners, axis-parallel rays, secondary segments and closest hits,
-//! with AVX2 and without.
+//! along edges and at corners, axis-parallel rays, secondary segments and closest hits, of
+//! both faces and of fronts alone, with AVX2 and without.
 
-use super::{Fan, Packet, Ray, Segments, Tracer};
+use super::{Faces, Fan, Packet, Ray, Segments, Tracer};
 use crate::{
     render::{
         ao::cosine_distributed,
@@ -17,7 +17,8 @@ use std::path::Path;
 /// Rays, those that the scalar walk alone meets something on, those that the wide ones
 /// alone do, those on which the wide ones differ from each other; and closest hits that
 /// are another triangle's, as near as rounding can tell: at an edge, which triangle is
-/// left out because another was found first depends on the order of a walk.
+/// left out because another was found first depends on the order of a walk. Of fronts
+/// alone, rays that meet nothing but backs are counted, too.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Counts {
     rays: u64,
@@ -25,6 +26,7 @@ struct Counts {
     false_hits: u64,
     differ: u64,
     beside: u64,
+    culled: u64,
 }
 
 impl Counts {
@@ -33,6 +35,47 @@ impl Counts {
         self.missed += u64::from((truth & !fast).count_ones());
         self.false_hits += u64::from((fast & !truth).count_ones());
         self.differ += u64::from((fast ^ portable).count_ones());
+    }
+
+    /// A fan of 32 rays, and what the scalar walk says of it.
+    fn add_fan(&mut self, [fast, portable]: [&Tracer; 2], fan: &Fan, packets: &[Packet; 4]) -> u32 {
+        let ray = |i: usize| Ray::new(fan.origin, packets[i / 8].get(i), fan.tmax);
+        let truth = bits(|i| fast.scalar().occluded_by(&ray(i), fan.faces));
+        let a = fast.occluded_from(fan, packets, u32::MAX);
+        self.add(truth, a, portable.occluded_from(fan, packets, u32::MAX));
+        // What one or two packets of it give.
+        assert_eq!(fast.occluded_from(fan, &[packets[0]], 0xff), a & 0xff);
+        assert_eq!(fast.occluded_from(fan, &[packets[0], packets[1]], 0x1fff), a & 0x1fff);
+        truth
+    }
+
+    /// As many segments; the first eight one by one, too.
+    fn add_segments(&mut self, [fast, portable]: [&Tracer; 2], segments: &[Segments; 4], faces: Faces) -> u32 {
+        let ray = |i: usize| {
+            let pack = &segments[i / 8];
+            Ray::new(pack.origins.get(i), pack.directions.get(i), pack.tmax[i % 8])
+        };
+        let truth = bits(|i| fast.scalar().occluded_by(&ray(i), faces));
+        let [a, b] = [fast, portable].map(|t| t.occluded_segments(segments, u32::MAX, faces));
+        self.add(truth, a, b);
+        for tracer in [fast, portable] {
+            assert_eq!(bits(|i| i < 8 && tracer.occluded_by(&ray(i), faces)), truth & 0xff);
+        }
+        truth
+    }
+
+    /// What was found as nearest: the triangle, where it is known, and the distance.
+    fn add_nearest<T: PartialEq>(&mut self, [truth, fast, portable]: [Option<(f32, T)>; 3], offset: f32) {
+        self.rays += 1;
+        self.missed += u64::from(truth.is_some() && fast.is_none());
+        self.differ += u64::from(fast != portable);
+        if let Some((t, _)) = &fast
+            && fast != truth
+        {
+            let beside = truth.is_some_and(|(of, _)| (t - of).abs() <= offset);
+            self.beside += u64::from(beside);
+            self.false_hits += u64::from(!beside);
+        }
     }
 }
 
@@ -92,12 +135,13 @@ fn bits(f: impl Fn(usize) -> bool) -> u32 {
 }
 
 /// Fans, segments and closest hits of a scene: about `rays` fan rays, as many segments,
-/// a quarter of closest hits.
-fn check(scene: &Scene, rays: u64) -> [Counts; 3] {
+/// a quarter of closest hits; and all of these of fronts alone.
+fn check(scene: &Scene, rays: u64) -> [Counts; 4] {
     let fast = Tracer::new(&scene.triangles().map(|t| t.1).collect::<Vec<_>>());
     let portable = fast.clone().portable();
+    let both = [&fast, &portable];
     let points = points(scene, &fast, 96);
-    let [mut fans, mut segments, mut closest] = [Counts::default(); 3];
+    let [mut fans, mut segments, mut closest, mut fronts] = [Counts::default(); 4];
     for group in 0..(rays / 32) as u32 {
         let s = points[group as usize * 7919 % points.len()];
         let origin = s.point + s.normal * fast.offset();
@@ -111,56 +155,46 @@ fn check(scene: &Scene, rays: u64) -> [Counts; 3] {
             let d = if i % 2 == 0 { d1 } else { w.cross(d1) };
             crossing[i / 8].set(i % 8, origin + w * (radius * 0.5) - d * (radius * 0.25), d, radius * 0.5);
         }
-        let fan = Fan { origin, normal: s.normal, tmax: radius };
-        let truth = bits(|i| fast.scalar().occluded(&Ray::new(origin, directions[i], radius)));
-        let [a, b] = [&fast, &portable].map(|t| t.occluded_from(&fan, &packets, u32::MAX));
-        fans.add(truth, a, b);
-        // What one or two packets of it give.
-        assert_eq!(fast.occluded_from(&fan, &[packets[0]], 0xff), a & 0xff);
-        assert_eq!(fast.occluded_from(&fan, &[packets[0], packets[1]], 0x1fff), a & 0x1fff);
+        let fan = Fan { origin, normal: s.normal, tmax: radius, faces: Faces::Both };
+        let met = fans.add_fan(both, &fan, &packets);
+        let fronts_met = fronts.add_fan(both, &Fan { faces: Faces::Front, ..fan }, &packets);
+        fronts.culled += u64::from((met & !fronts_met).count_ones());
+        let met = segments.add_segments(both, &crossing, Faces::Both);
+        let fronts_met = fronts.add_segments(both, &crossing, Faces::Front);
+        fronts.culled += u64::from((met & !fronts_met).count_ones());
 
-        let at = |i: usize| {
-            let pack = &crossing[i / 8];
-            Ray::new(pack.origins.get(i), pack.directions.get(i), pack.tmax[i % 8])
-        };
-        let truth = bits(|i| fast.scalar().occluded(&at(i)));
-        segments.add(
-            truth,
-            fast.occluded_segments(&crossing, u32::MAX),
-            portable.occluded_segments(&crossing, u32::MAX),
-        );
-        assert_eq!(bits(|i| i < 8 && fast.occluded(&at(i))), truth & 0xff);
         let of_eight = eight(origin, &directions);
-        let of_eight = [&fast, &portable].map(|t| t.closest_of(&of_eight, 0xff));
+        let of_eight = both.map(|t| t.closest_of(&of_eight, 0xff));
         for (lane, &direction) in directions[..8].iter().enumerate() {
             let ray = Ray::new(origin, direction, 1e30);
-            let [truth, a, b] = [fast.scalar().closest(&ray), fast.closest(&ray), portable.closest(&ray)];
-            closest.rays += 1;
-            closest.missed += u64::from(truth.is_some() && a.is_none());
+            let hits = [fast.scalar().closest(&ray), fast.closest(&ray), portable.closest(&ray)];
             // Field by field, bits and all.
-            let beside =
-                a.zip(truth).is_some_and(|(a, b)| a.triangle != b.triangle && (a.t - b.t).abs() <= fast.offset());
-            closest.beside += u64::from(a != truth && beside);
-            closest.false_hits += u64::from(a.is_some() && a != truth && !beside);
-            closest.differ += u64::from(a != b);
-            assert_eq!(fast.distance(&ray), a.map(|h| h.t));
-            for hits in &of_eight {
-                assert_eq!(hits.get(lane), a);
+            closest.add_nearest(hits.map(|h| h.map(|h| (h.t, h))), fast.offset());
+            assert_eq!(fast.distance(&ray, Faces::Both), hits[1].map(|h| h.t));
+            for eight in &of_eight {
+                assert_eq!(eight.get(lane), hits[1]);
             }
+            let [a, b] = both.map(|t| t.distance(&ray, Faces::Front));
+            let distances = [fast.scalar().distance(&ray, Faces::Front), a, b];
+            fronts.add_nearest(distances.map(|t| t.map(|t| (t, ()))), fast.offset());
+            fronts.culled += u64::from(a != hits[1].map(|h| h.t));
         }
     }
-    [fans, segments, closest]
+    [fans, segments, closest, fronts]
 }
 
 #[test]
 fn every_answer_is_the_scalar_walks() {
+    let mut all_culled = 0;
     for name in ["atrium", "curtain-arcade", "leaves", "blinds"] {
         for counts in check(&library::scene(name).unwrap(), 200_000) {
-            let Counts { rays, beside, .. } = counts;
-            assert_eq!(counts, Counts { rays, beside, ..Counts::default() }, "{name}");
+            let Counts { rays, beside, culled, .. } = counts;
+            assert_eq!(counts, Counts { rays, beside, culled, ..Counts::default() }, "{name}");
             assert!(rays >= 49_000 && beside * 10_000 <= rays, "{name}: {counts:?}");
+            all_culled += culled;
         }
     }
+    assert!(all_culled > 10_000, "{all_culled} answers without backs differ from those with them");
 }
 
 /// For `.ci/peers rays`: millions of rays in the scenes of `AOGAUGE_RAY_SCENES`, built in by
@@ -174,9 +208,10 @@ fn ten_million_rays_a_scene() {
     for name in names.split_whitespace() {
         let scene = if name.ends_with(".toml") { Scene::from_file(Path::new(name)) } else { library::scene(name) };
         let scene = scene.unwrap();
-        let lines = ["fans", "segments", "closest hits"].iter().zip(check(&scene, millions * 1_000_000));
+        let lines =
+            ["fans", "segments", "closest hits", "fronts alone"].iter().zip(check(&scene, millions * 1_000_000));
         for (kind, c) in lines {
-            let Counts { rays, missed, false_hits, differ, beside } = c;
+            let Counts { rays, missed, false_hits, differ, beside, .. } = c;
             wrong += missed + false_hits + differ;
             let name = &scene.name;
             text += &format!(

@@ -27,7 +27,7 @@
 //! scalar walk would turn away, too.
 
 use super::{
-    Ray, Tracer,
+    Faces, Ray, Tracer,
     free::{self, Crossed, Sheared},
     lanes::Lanes,
     tree8::{Block, Node8},
@@ -53,6 +53,8 @@ pub struct Fan {
     pub normal: Vec3,
     /// Length, metres; a hit at exactly this distance counts.
     pub tmax: f32,
+    /// Which side of a triangle closes a ray.
+    pub faces: Faces,
 }
 
 struct Shared<'a, L, const N: usize> {
@@ -140,7 +142,7 @@ impl<L: Lanes, const N: usize> Bundle<L> for Shared<'_, L, N> {
             let i = left.trailing_zeros() as usize & 31;
             left &= left - 1;
             let direction = self.rays[if N == 1 { 0 } else { i / 8 % N }].get(i);
-            let (met, unsure) = volumes.meets(direction, self.tmax);
+            let (met, unsure) = volumes.meets(block, self.fan.faces, direction, self.tmax);
             if met || unsure != 0 && confirm::<L>(self.tracer, block, unsure, self.fan, direction) {
                 closed |= 1 << i;
             }
@@ -211,16 +213,19 @@ impl<L: Lanes> Volumes<L> {
 
     /// Whether a ray surely meets a triangle, and which it may meet.
     #[inline(always)]
-    fn meets(&self, direction: Vec3, tmax: L) -> (bool, u32) {
+    fn meets(&self, block: &Block, faces: Faces, direction: Vec3, tmax: L) -> (bool, u32) {
         let d = splat3::<L>(direction);
         let [bc, ca, ab] = self.edges;
         let (u, v, w) = (dot(d, bc), dot(d, ca), dot(d, ab));
         let least = u.min(v).min(w);
         // t = volume / (u + v + w) <= tmax, without the division.
         let bound = u.add(v).add(w).mul(tmax);
-        let maybe = L::le2(self.minus_edge, least, self.least, bound) & !self.flat;
-        if maybe != 0 && L::le2(self.edge, least, self.most, bound) & !self.flat != 0 {
-            return (true, 0);
+        let mut maybe = L::le2(self.minus_edge, least, self.least, bound) & !self.flat;
+        if maybe != 0 {
+            maybe = faces.among::<L>(block, maybe, direction);
+            if L::le2(self.edge, least, self.most, bound) & maybe != 0 {
+                return (true, 0);
+            }
         }
         if self.flat == 0 {
             return (false, maybe);
@@ -233,6 +238,7 @@ impl<L: Lanes> Volumes<L> {
             let z = main_axis(direction);
             let zero = L::splat(0.0);
             flat &= !if direction[z] > 0.0 { self.hi[z].le(zero) } else { zero.le(self.lo[z]) };
+            flat = faces.among::<L>(block, flat, direction);
         }
         (false, maybe | flat)
     }

@@ -4,7 +4,7 @@
 //! the scalar test's own order, so the bits are the same.
 
 use super::{
-    Ray, Tracer,
+    Faces, Ray, Tracer,
     lanes::Lanes,
     tree8::{Block, Node8},
     triangle::main_axis,
@@ -87,8 +87,9 @@ impl Queue {
         self.count += 1;
     }
 
-    /// Empties the queue: which of those that waited meet anything, a bit each.
-    pub fn occluded(&mut self, tracer: &Tracer) -> u32 {
+    /// Empties the queue: which of those that waited meet anything that turns such a face
+    /// against them, a bit each.
+    pub fn occluded(&mut self, tracer: &Tracer, faces: Faces) -> u32 {
         let count = std::mem::take(&mut self.count);
         if count == 0 {
             return 0;
@@ -98,10 +99,10 @@ impl Queue {
         let mask = u32::MAX >> (32 - count);
         let [a, b, c, d] = self.segments;
         match packs {
-            1 => tracer.occluded_segments(&[a], mask),
-            2 => tracer.occluded_segments(&[a, b], mask),
-            3 => tracer.occluded_segments(&[a, b, c, c], mask),
-            _ => tracer.occluded_segments(&[a, b, c, d], mask),
+            1 => tracer.occluded_segments(&[a], mask, faces),
+            2 => tracer.occluded_segments(&[a, b], mask, faces),
+            3 => tracer.occluded_segments(&[a, b, c, c], mask, faces),
+            _ => tracer.occluded_segments(&[a, b, c, d], mask, faces),
         }
     }
 }
@@ -202,13 +203,19 @@ struct Own<'a, L, const N: usize> {
     tracer: &'a Tracer,
     segments: &'a [Segments; N],
     slopes: &'a [Slopes; N],
+    faces: Faces,
     lo: [L; 3],
     hi: [L; 3],
 }
 
 /// A bit for each segment of `all` that meets a triangle.
 #[inline(always)]
-pub(super) fn occluded<L: Lanes, const N: usize>(tracer: &Tracer, segments: &[Segments; N], all: u32) -> u32 {
+pub(super) fn occluded<L: Lanes, const N: usize>(
+    tracer: &Tracer,
+    segments: &[Segments; N],
+    all: u32,
+    faces: Faces,
+) -> u32 {
     let mut slopes = [Slopes([[0.0; 8]; 7]); N];
     let (mut lo, mut hi) = ([L::splat(f32::INFINITY); 3], [L::splat(f32::NEG_INFINITY); 3]);
     for (slopes, s) in slopes.iter_mut().zip(segments) {
@@ -225,6 +232,7 @@ pub(super) fn occluded<L: Lanes, const N: usize>(tracer: &Tracer, segments: &[Se
         tracer,
         segments,
         slopes: &slopes,
+        faces,
         lo: [lo[0].least(), lo[1].least(), lo[2].least()],
         hi: [hi[0].greatest(), hi[1].greatest(), hi[2].greatest()],
     };
@@ -255,13 +263,18 @@ impl<L: Lanes, const N: usize> Bundle<L> for Own<'_, L, N> {
             let (s, lane) = (&self.segments[packet], i & 7);
             let [x, y, z, ..] = &self.slopes[packet].0;
             let inverse = Vec3::new(x[lane], y[lane], z[lane]);
-            let ray = Sheared::new(s.origins.get(lane), s.directions.get(lane), inverse);
+            let direction = s.directions.get(lane);
+            let ray = Sheared::new(s.origins.get(lane), direction, inverse);
             let tmax = s.tmax[lane];
-            let Crossed { met, sure, .. } = meets::<L>(&ray, block, tmax, tmax);
-            if sure != 0 {
+            let Crossed { mut met, sure, .. } = meets::<L>(&ray, block, tmax, tmax);
+            if met == 0 {
+                continue;
+            }
+            met = self.faces.among::<L>(block, met, direction);
+            if sure & met != 0 {
                 closed |= 1 << i;
             } else if met != 0 {
-                let ray = Ray::new(s.origins.get(lane), s.directions.get(lane), s.tmax[lane]);
+                let ray = Ray::new(s.origins.get(lane), direction, tmax);
                 closed |= u32::from(self.tracer.comes_to_any(block, met, &ray)) << i;
             }
         }

@@ -4,8 +4,10 @@
 //!   their origin and length;
 //! - [`Tracer::occluded_segments`] of rays with origins of their own;
 //! - [`Tracer::closest_of`] of what eight rays meet first;
-//! - [`Tracer::closest`], [`Tracer::distance`] and [`Tracer::occluded`] of one ray;
-//! - [`Tracer::scalar`] where only some triangles count.
+//! - [`Tracer::closest`], [`Tracer::distance`] and [`Tracer::occluded`] of one ray.
+//!
+//! [`Faces`] says which side of a triangle counts where anything on a ray, or the
+//! distance to it, is asked for. [`Tracer::scalar`] is what all answers are held against.
 //!
 //! The binary tree is obvhs's `Bvh2`; folded eight wide it is walked by our own
 //! traversals, because the library's triangle test is not watertight and its any-hit
@@ -16,6 +18,7 @@
 
 mod build;
 mod eight;
+mod faces;
 mod fan;
 mod fold;
 mod free;
@@ -30,6 +33,7 @@ mod wide;
 
 pub use build::Node;
 pub use eight::Hits;
+pub use faces::Faces;
 pub use fan::Fan;
 pub use free::{Queue, Segments};
 pub use nearest::Nearest;
@@ -174,25 +178,37 @@ impl Tracer {
     /// those in `mask`; N is 1 to 4. Lanes outside `mask` should repeat another
     /// ([`Segments::fill`]): what they reach is looked at.
     #[inline]
-    pub fn occluded_segments<const N: usize>(&self, segments: &[Segments; N], mask: u32) -> u32 {
+    pub fn occluded_segments<const N: usize>(&self, segments: &[Segments; N], mask: u32, faces: Faces) -> u32 {
         let tracer = self;
-        by_lanes!(self.fast, free::occluded[N], (tracer: &Tracer, segments: &[Segments; N], mask: u32) -> u32)
+        by_lanes!(
+            self.fast,
+            free::occluded[N],
+            (tracer: &Tracer, segments: &[Segments; N], mask: u32, faces: Faces) -> u32
+        )
     }
 
     /// Whether anything lies on the ray within `(0, tmax]`.
     pub fn occluded(&self, ray: &Ray) -> bool {
-        self.any(ray)
+        self.occluded_by(ray, Faces::Both)
     }
 
-    /// Distance along the ray, within `(0, tmax]`, to the nearest triangle.
-    pub fn distance(&self, ray: &Ray) -> Option<f32> {
-        self.first(ray).map(|met| met.t)
+    /// The same, of triangles that turn such a face against the ray.
+    #[inline]
+    pub fn occluded_by(&self, ray: &Ray, faces: Faces) -> bool {
+        let tracer = self;
+        by_lanes!(self.fast, one::any[], (tracer: &Tracer, ray: &Ray, faces: Faces) -> bool)
+    }
+
+    /// Distance along the ray, within `(0, tmax]`, to the nearest triangle that turns
+    /// such a face against it.
+    pub fn distance(&self, ray: &Ray, faces: Faces) -> Option<f32> {
+        self.first(ray, faces).map(|met| met.t)
     }
 
     /// The nearest triangle on the ray within `(0, tmax]`; of several at one
     /// distance the first in the scene, whatever the order of the walk.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
-        let met = self.first(ray)?;
+        let met = self.first(ray, Faces::Both)?;
         Some(self.hit(ray, met.t, met.triangle(self) as usize, met.weights))
     }
 
@@ -204,15 +220,9 @@ impl Tracer {
     }
 
     #[inline]
-    fn first(&self, ray: &Ray) -> Option<one::Met> {
+    fn first(&self, ray: &Ray, faces: Faces) -> Option<one::Met> {
         let tracer = self;
-        by_lanes!(self.fast, one::first[], (tracer: &Tracer, ray: &Ray) -> Option<one::Met>)
-    }
-
-    #[inline]
-    fn any(&self, ray: &Ray) -> bool {
-        let tracer = self;
-        by_lanes!(self.fast, one::any[], (tracer: &Tracer, ray: &Ray) -> bool)
+        by_lanes!(self.fast, one::first[], (tracer: &Tracer, ray: &Ray, faces: Faces) -> Option<one::Met>)
     }
 
     /// What is known of a hit on a triangle, by its barycentric weights.

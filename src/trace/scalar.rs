@@ -1,7 +1,7 @@
 //! One ray at a time down the binary tree: the reference that the wide walks are
-//! held against, and for what they do not do.
+//! held against.
 
-use super::{Hit, Node, Ray, STACK, Tracer, tree8::Block};
+use super::{Faces, Hit, Node, Ray, STACK, Tracer, tree8::Block};
 use glam::{Vec3, Vec3A};
 
 /// A tracer walked ray by ray, on any machine alike.
@@ -24,27 +24,25 @@ fn enter(node: &Node, origin: Vec3A, inverse: Vec3A, tmax: f32) -> f32 {
 impl Scalar<'_> {
     /// Whether anything lies on the ray within `(0, tmax]`.
     pub fn occluded(self, ray: &Ray) -> bool {
-        self.occluded_by(ray, |_| true)
+        self.occluded_by(ray, Faces::Both)
     }
 
-    /// Whether a triangle that `accept` takes (by its corners) lies on the ray
-    /// within `(0, tmax]`.
+    /// As [`Tracer::occluded_by`].
     #[inline]
-    pub fn occluded_by(self, ray: &Ray, accept: impl Fn(&[Vec3; 3]) -> bool) -> bool {
+    pub fn occluded_by(self, ray: &Ray, faces: Faces) -> bool {
         self.walk(ray, ray.tmax, |triangle, tmax| {
             let corners = &self.0.triangles[triangle];
-            if ray.meets(corners, tmax).is_some() && accept(corners) { None } else { Some(tmax) }
+            if ray.meets(corners, tmax).is_some() && faces.count(corners, ray.direction) { None } else { Some(tmax) }
         })
     }
 
-    /// Distance along the ray, within `(0, tmax]`, to the nearest triangle that
-    /// `accept` takes.
-    pub fn distance_by(self, ray: &Ray, accept: impl Fn(&[Vec3; 3]) -> bool) -> Option<f32> {
+    /// As [`Tracer::distance`].
+    pub fn distance(self, ray: &Ray, faces: Faces) -> Option<f32> {
         let mut nearest = None;
         self.walk(ray, ray.tmax, |triangle, tmax| {
             let corners = &self.0.triangles[triangle];
             match ray.meets(corners, tmax) {
-                Some((t, _)) if accept(corners) => {
+                Some((t, _)) if faces.count(corners, ray.direction) => {
                     nearest = Some(t);
                     Some(t)
                 }

@@ -2,7 +2,7 @@
 //! rays by one walk of the tree, then the secondary rays of those that are open. What
 //! `decide` says of each, bit by bit.
 
-use super::{Decided, Primary, Segment, Shading};
+use super::{Decided, Primary, Shading};
 use crate::{
     render::sampler::{Sampler, turn},
     trace::{Packet, Queue},
@@ -73,7 +73,7 @@ struct Waiting {
 
 impl Shading<'_> {
     /// Decides samples `first` and following, at most [`MOST`], of a method without
-    /// falloff that takes both faces.
+    /// falloff.
     pub(super) fn decide_together(&self, first: u32, sampler: &Sampler, decided: &mut [Decided]) {
         let packs = decided.len().div_ceil(8).min(4);
         let mut drawn = [Eight::NONE; 4];
@@ -108,10 +108,13 @@ impl Shading<'_> {
             let shift = of.shift.map(|v| v[lane]);
             let fan = self.fan(primary, self.ao.radius, shift, extension);
             for k in 0..secondary_rays {
-                waiting.push(i, k, &fan.segment(self, k, shift[1], extension));
-                if waiting.queue.is_full() {
-                    self.close(&mut waiting, decided);
-                }
+                fan.segment(self, k, shift[1], extension).rays(self.method.faces, |origin, direction, length| {
+                    waiting.of[waiting.queue.count() % MOST] = (i as u8, k as u8);
+                    waiting.queue.push(origin, direction, length);
+                    if waiting.queue.is_full() {
+                        self.close(&mut waiting, decided);
+                    }
+                });
             }
         }
         self.close(&mut waiting, decided);
@@ -119,7 +122,8 @@ impl Shading<'_> {
 
     /// Which primary rays meet something within R.
     fn occluded_together(&self, directions: &[Packet; 4], packs: usize, mask: u32) -> u32 {
-        let fan = crate::trace::Fan { origin: self.origin, normal: self.normal, tmax: self.ao.radius };
+        let (origin, normal) = (self.origin, self.normal);
+        let fan = crate::trace::Fan { origin, normal, tmax: self.ao.radius, faces: self.method.faces };
         let [a, b, ..] = *directions;
         match packs {
             1 => self.tracer.occluded_from(&fan, &[a], mask),
@@ -130,7 +134,7 @@ impl Shading<'_> {
 
     /// Traces what waits.
     fn close(&self, waiting: &mut Waiting, decided: &mut [Decided]) {
-        let mut closed = waiting.queue.occluded(self.tracer);
+        let mut closed = waiting.queue.occluded(self.tracer, self.method.faces);
         while closed != 0 {
             let (i, k) = waiting.of[closed.trailing_zeros() as usize];
             closed &= closed - 1;
@@ -139,20 +143,13 @@ impl Shading<'_> {
     }
 }
 
-impl Waiting {
-    #[inline]
-    fn push(&mut self, i: usize, k: u32, segment: &Segment) {
-        let Segment { middle, direction, back, forth } = *segment;
-        self.of[self.queue.count() % MOST] = (i as u8, k as u8);
-        self.queue.push(middle - direction * back, direction, back + forth);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{
-        render::{Extension, Falloff, Geometry, Openness, ReceiverPlane, SecondaryOrigin, Sides, gbuffer::GBuffer},
+        render::{
+            Extension, Faces, Falloff, Geometry, Openness, ReceiverPlane, SecondaryOrigin, Sides, gbuffer::GBuffer,
+        },
         scenes::library::scene,
     };
     use glam::Vec3;
@@ -160,7 +157,7 @@ mod tests {
     /// In all variants of secondary rays and numbers of rays, with AVX2 and without.
     #[test]
     fn a_group_decides_as_one_by_one() {
-        let mut closed = [0; 2];
+        let mut closed = [[0; 2]; 2];
         for name in ["curtain-arcade", "leaves"] {
             let scene = scene(name).unwrap();
             let fast = Geometry::new(&scene).unwrap().tracer;
@@ -173,8 +170,8 @@ mod tests {
             let extensions = [None, Some(paper), Some(clipped), Some(eight), Some(jittered)];
             for (pixel, s) in points.iter().enumerate().filter_map(|(i, s)| Some((i, s.as_ref()?))).step_by(97) {
                 let rays = [1, 4, 8, 13, 16, 21, 32][pixel % 7];
-                for extension in extensions {
-                    let method = Openness { extension, ..Openness::plain(Falloff::Step) };
+                for (extension, faces) in extensions.into_iter().flat_map(|e| [(e, Faces::Both), (e, Faces::Front)]) {
+                    let method = Openness { extension, faces, ..Openness::plain(Falloff::Step) };
                     let sampler = Sampler::new(3, pixel as u32, 1);
                     for tracer in [&fast, &portable] {
                         let shading = Shading::new(tracer, s.point, s.normal, scene.ao, method);
@@ -184,15 +181,15 @@ mod tests {
                             for (i, decided) in (first..).zip(decided) {
                                 let shift = if shading.has_chance() { sampler.pair(i, 1) } else { [0.0; 2] };
                                 assert_eq!(decided, shading.decide(sampler.pair(i, 0), shift), "{name} {pixel} {i}");
-                                closed[0] += u32::from(decided.hit);
-                                closed[1] += decided.closed.count_ones();
+                                closed[faces as usize][0] += u32::from(decided.hit);
+                                closed[faces as usize][1] += decided.closed.count_ones();
                             }
                         }
                     }
                 }
             }
         }
-        assert!(closed.into_iter().all(|n| n > 500), "the test must meet something: {closed:?}");
+        assert!(closed.into_iter().flatten().all(|n| n > 500), "the test must meet something: {closed:?}");
     }
 
     #[test]

@@ -25,7 +25,7 @@ impl Shading<'_> {
         let primary = self.primary_at([u, v]);
         let direction = primary.direction;
         let reach = self.method.reach(self.ao.radius);
-        let length = self.tracer.distance(&Ray::new(self.origin, direction, reach)).unwrap_or(reach);
+        let length = self.tracer.distance(&Ray::new(self.origin, direction, reach), self.method.faces).unwrap_or(reach);
         let mut secondary = Vec::new();
         if let Some(extension) = self.method.extension.filter(|_| decided.mu > 0.0) {
             let fan = self.fan(primary, length.min(self.ao.radius), shift, extension);

@@ -5,7 +5,7 @@
 use super::{PAIRS, SURE_BOUNCES, aimed, portals, radiance};
 use crate::{
     render::{Geometry, ao::cosine_distributed, gbuffer::FAR_AWAY, lights::lambert, sampler::Sampler},
-    trace::{Hit, Packet, Queue, Segments},
+    trace::{Faces, Hit, Packet, Queue, Segments},
 };
 use aogauge_scenes::Portal;
 use glam::Vec3;
@@ -196,7 +196,7 @@ impl Batch {
             }
             if queue.is_full() || i + 1 == self.count {
                 let count = queue.count();
-                let closed = queue.occluded(&geometry.tracer);
+                let closed = queue.occluded(&geometry.tracer, Faces::Both);
                 for (k, &(lane, light)) in waiting[..count].iter().enumerate() {
                     if closed >> k & 1 == 0 {
                         self.add(lane, Vec3::splat(light));
