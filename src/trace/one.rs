@@ -264,7 +264,8 @@ mod tests {
 
     /// Rays in the planes of triangles that pass beyond their corners. Seen from the edge,
     /// sheared corners lie on a line through the ray but for rounding: then the triangle
-    /// test may take as met what is not, and the scalar walk does not come there.
+    /// test meets by rounding what is far beside the ray, and the scalar walk does not come
+    /// there. Behind it is a wall.
     #[test]
     fn where_the_nearest_is_not_come_to_the_answer_is_still_the_scalar_walks() {
         let triangles = cluster();
@@ -294,8 +295,7 @@ mod tests {
                 assert_eq!(distance, portable.distance(&ray, Faces::Front), "{ray:?}");
             }
         }
-        eprintln!("{entered} {of_fronts} {hits}");
-        assert!(entered > 20 && of_fronts > 5 && hits > 20, "{entered} {of_fronts} {hits}");
+        assert!(entered > 200 && of_fronts > 100 && hits > 200, "{entered} {of_fronts} {hits}");
     }
 
     /// All walks say what the scalar one says, of closest hits and of any.

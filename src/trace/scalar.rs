@@ -124,7 +124,8 @@ impl Tracer {
     /// its leaf's box. It comes to all boxes around that, because rounding is monotonic.
     ///
     /// At its very edge the triangle test meets by rounding what lies up to 8 u of the
-    /// largest coordinate beside it, which may be outside of that box.
+    /// largest coordinate beside it, and what passes beyond a corner where a triangle is seen
+    /// from its edge: that may be outside of the box.
     #[inline]
     pub(super) fn comes_to(&self, ray: &Ray, triangle: u32) -> bool {
         let leaf = &self.nodes[self.leaves[triangle as usize] as usize];
