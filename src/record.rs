@@ -7,6 +7,7 @@
 
 mod end;
 mod folder;
+mod image;
 pub mod pictures;
 mod source;
 mod until_sure;

@@ -51,18 +51,20 @@ pub struct ImageChange {
 
 /// Compares the images of the cases in both records that are not the same to the last
 /// bit, the surest change first. Those of other scenes and methods are left out. An image
-/// that cannot be read costs its case alone: records are often kept without their images.
+/// that cannot be read, or is not the one that was measured, costs its case alone: records are
+/// often kept without their images. Of images that are the same by their records, only those
+/// are told of that are there and are not what their record says.
 pub fn images(base: (&Path, &Record), new: (&Path, &Record)) -> Vec<ImageChange> {
     let grounds = Grounds::of(base.1, new.1);
     let old = by_id(base.1);
-    let changed: Vec<(&CaseRecord, &CaseRecord)> = new
+    let (same, changed): (Vec<_>, Vec<_>) = new
         .1
         .cases
         .iter()
         .filter(|c| c.error.is_none() && grounds.has_case(&c.case))
         .filter_map(|c| Some((*old.get(&c.case.id())?, c)))
-        .filter(|(was, is)| was.error.is_none() && !is_identical(was, is))
-        .collect();
+        .filter(|(was, _)| was.error.is_none())
+        .partition(|(was, is)| is_identical(was, is));
     let regions = regions_of(new);
     let none = BTreeMap::new();
     let one = |(was, is): &(&CaseRecord, &CaseRecord)| {
@@ -71,7 +73,15 @@ pub fn images(base: (&Path, &Record), new: (&Path, &Record)) -> Vec<ImageChange>
         let found = compared((base.0, base.1, was), (new.0, new.1, is), &terms);
         change(is.case.id(), found)
     };
+    let spoilt = |(was, is): &(&CaseRecord, &CaseRecord)| {
+        let error = [(base.0, *was), (new.0, *is)].into_iter().find_map(|(folder, case)| {
+            let is_there = folder.join(case.image.as_deref()?).exists();
+            is_there.then(|| case.layers(folder).err()).flatten()
+        });
+        Some(change(is.case.id(), Err(error?)))
+    };
     let mut found: Vec<ImageChange> = changed.par_iter().map(one).collect();
+    found.par_extend(same.par_iter().filter_map(spoilt));
     let sure = |i: &ImageChange| i.p.unwrap_or(0.0);
     let size = |i: &ImageChange| i.rmse.unwrap_or(0.0);
     found.sort_by(|a, b| a.state.cmp(&b.state).then(sure(a).total_cmp(&sure(b))).then(size(b).total_cmp(&size(a))));

@@ -10,6 +10,17 @@ use crate::{
 /// So many times the replicates that it takes are not worth naming.
 const MOST: f64 = 1000.0;
 
+/// Numbers of times the replicates that are looked at, one after the other: up to [`MOST`], then
+/// without end.
+///
+/// What more replicates decide, still more need not: as the own part of the variance goes, the
+/// floor's degrees of freedom, often few, are what is left of Welch and Satterthwaite's, and
+/// Student's tails grow faster than the standard error falls. So no single number tells.
+fn prospects() -> impl Iterator<Item = f64> {
+    let steps = 2.0 * MOST.log2();
+    (0..steps.ceil() as u32).map(|i| f64::from(i) / 2.0).map(f64::exp2).chain([MOST, f64::INFINITY])
+}
+
 /// So many standard errors of its own replicates a value may be thought to move.
 const REACH: f64 = 2.0;
 
@@ -93,10 +104,16 @@ impl Verdict {
     /// where it is: 1.1 to 1000. None where more than that would be needed or none suffice,
     /// and where it is not known. `family` is how many verdicts the run has.
     pub fn replicates_needed(&self, family: usize) -> Option<f64> {
-        let (mut low, mut high) = (1.1, MOST);
-        if self.out_of_sight(high, family)? > 1.0 {
-            return None;
+        const LEAST: f64 = 1.1;
+        let (mut low, mut high) = (LEAST, None);
+        for times in prospects().filter(|times| (LEAST..=MOST).contains(times)) {
+            if self.out_of_sight(times, family)? <= 1.0 {
+                high = Some(times);
+                break;
+            }
+            low = times;
         }
+        let mut high = high?;
         for _ in 0..40 {
             let middle = f64::sqrt(low * high);
             if self.out_of_sight(middle, family)? > 1.0 { low = middle } else { high = middle }
@@ -110,17 +127,18 @@ impl Verdict {
     pub fn is_kept_by_floor(&self, family: usize) -> bool {
         let (Some(floor), Some(se)) = (self.floor, self.se()) else { return false };
         let is_most = 2.0 * floor.se.powi(2) >= se.powi(2);
-        let ratio = self.out_of_sight(f64::INFINITY, family);
-        ratio.is_some_and(|ratio| ratio > 1.0 && (is_most || ratio * ratio < MOST))
+        let ratios = prospects().map(|times| self.out_of_sight(times, family));
+        let least = ratios.reduce(|least, ratio| Some(least?.min(ratio?))).flatten();
+        least.is_some_and(|ratio| ratio > 1.0 && (is_most || ratio * ratio < MOST))
     }
 
-    /// Whether more replicates of the case may still decide: by what the rest of the standard error
-    /// leaves, were there no end to them, with the value anywhere within 2 of its own
-    /// standard errors. `family` is how many verdicts the run has at most.
+    /// Whether more replicates of the case may still decide: by what some number of them leaves
+    /// of the standard error, with the value anywhere within 2 of its own standard errors.
+    /// `family` is how many verdicts the run has at most.
     ///
     /// To end there errs no more often than to go on: what is not decided stays so.
     pub fn can_be_decided(&self, family: usize) -> bool {
-        let (Some(held), Some(rest)) = (self.held(), self.after(f64::INFINITY)) else { return false };
+        let Some(held) = self.held() else { return false };
         if self.p_holds.is_none() || self.p_broken.is_none() {
             return false;
         }
@@ -130,10 +148,12 @@ impl Verdict {
             super::Limit::Equals { target, .. } => target.clamp(low, high),
             _ => held.value,
         };
-        [low, best, high].into_iter().any(|value| {
-            let there = Estimate { value, ..rest };
-            let p = [self.limit.p_holds(&there), self.limit.p_broken(&there)];
-            decided(p, family, self.spent, 1.0 - self.confidence)
+        prospects().filter_map(|times| self.after(times)).any(|after| {
+            [low, best, high].into_iter().any(|value| {
+                let there = Estimate { value, ..after };
+                let p = [self.limit.p_holds(&there), self.limit.p_broken(&there)];
+                decided(p, family, self.spent, 1.0 - self.confidence)
+            })
         })
     }
 
@@ -224,6 +244,31 @@ mod tests {
         assert!(!verdict(equals, 0.5, 0.011, 0.01).can_be_decided(1));
         assert!(verdict(equals, 0.5, 0.011, 0.002).can_be_decided(1));
         assert!(!verdict(equals, 0.5, 0.011, 0.002).can_be_decided(100_000));
+    }
+
+    /// The floor's few degrees of freedom are not all that is left until its variance is: at 4
+    /// times the replicates it is decided over 242 verdicts, at infinitely many it would not be.
+    #[test]
+    fn what_ever_more_replicates_would_not_decide_some_may() {
+        let mut it = measured(case("s", "e", "cpu", 4), 0.5086, 0.003);
+        let part = Estimate { value: 0.0, se: 0.00044, df: 3.0 };
+        it.metrics[0] = it.metrics[0].clone().with_floor(Some(part));
+        let v = judged(vec![gate(LIMIT)], &[it], None).0.remove(0);
+        let family = 242;
+        let p = |times: f64| LIMIT.p_holds(&v.after(times).unwrap()) * family as f64;
+        assert!(
+            p(1.0) > 0.05 && p(4.0) < 1e-3 && p(f64::INFINITY) > 0.01,
+            "{} {} {}",
+            p(1.0),
+            p(4.0),
+            p(f64::INFINITY)
+        );
+        let family = 1000;
+        assert!(v.out_of_sight(f64::INFINITY, family).unwrap() > 1.0);
+        assert!(v.can_be_decided(family) && !v.is_kept_by_floor(family));
+        let times = v.replicates_needed(family).unwrap();
+        assert!((1.1..8.0).contains(&times), "{times}");
+        assert!(v.out_of_sight(times, family).unwrap() <= 1.0 && v.out_of_sight(0.9 * times, family).unwrap() > 1.0);
     }
 
     /// A base of 8 replicates against a case of ever more: its part stays.

@@ -116,12 +116,13 @@ pub(super) fn definition(record: &Record, estimator: &str) -> String {
 /// A case's image out of its record. Smoothing makes pixels depend on each other.
 ///
 /// # Errors
-/// Where the image cannot be read or lacks a layer.
+/// Where the image cannot be read, is not the one that was measured, or lacks a layer.
 pub fn sampled(folder: &Path, record: &Record, case: &CaseRecord) -> Result<Sampled, DiskError> {
     let path = folder.join(case.image.as_deref().unwrap_or_default());
     let method = record.suite.methods.get(&case.case.estimator);
     let depends = method.is_some_and(|m| m.temporal.is_some() || m.denoise.is_some());
-    Sampled::of_layers(&path, record.replicates(case), case.case.rays, record.seed, depends)
+    let layers = case.layers(folder)?;
+    Sampled::of_layers((&path, &layers), record.replicates(case), case.case.rays, record.seed, depends)
 }
 
 impl Store {

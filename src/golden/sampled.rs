@@ -98,15 +98,15 @@ impl Sampled {
         }
     }
 
-    /// The image out of the layers of a record, by what the record says of it.
+    /// The image out of the layers of a record, which were read from `path`, by what the record
+    /// says of it.
     pub(super) fn of_layers(
-        path: &Path,
+        (path, layers): (&Path, &Layers),
         replicates: u32,
         rays: u32,
         seed: u32,
         depends: bool,
     ) -> Result<Self, DiskError> {
-        let layers = Layers::read(path)?;
         let tiles = if depends {
             let images: Vec<&[f32]> =
                 layers.layers.iter().filter(|(n, _)| n.starts_with("replicate-")).map(|(_, v)| v.as_slice()).collect();
@@ -120,8 +120,8 @@ impl Sampled {
         };
         Ok(Sampled {
             resolution: layers.resolution,
-            mean: layer(&layers, path, "mean")?,
-            variance: layer(&layers, path, "variance")?,
+            mean: layer(layers, path, "mean")?,
+            variance: layer(layers, path, "variance")?,
             tiles,
             replicates,
             rays,

@@ -4,7 +4,7 @@
 
 use super::{ReportError, gallery::Gallery, middle};
 use crate::{
-    layers::{Layers, write_png},
+    layers::write_png,
     picture::{
         color_bar::color_bar,
         error_map::{ErrorMap, MapError},
@@ -69,6 +69,5 @@ pub fn write(scene: &SceneRecord, pair: &Pair<'_>, limit: f64, path: &Path) -> R
 /// The mean image of a case.
 pub fn mean(folder: &Path, case: &CaseRecord) -> Result<Vec<f32>, ReportError> {
     let image = case.image.as_deref().unwrap_or_default();
-    let layers = Layers::read(&folder.join(image))?;
-    super::layer(&layers, image, "mean")
+    super::layer(&case.layers(folder)?, image, "mean")
 }

@@ -26,7 +26,7 @@ use crate::{
     metrics::judge::too_noisy,
     picture::error_map::MapError,
     record::{
-        Record, SceneRecord,
+        CaseRecord, Record, SceneRecord,
         pictures::{self, LOOK, MEASURE, MINUS_CONVERGED, MINUS_Q},
     },
     untrusted,
@@ -179,7 +179,7 @@ fn draw_scene(folder: &Path, record: &Record, scene: &SceneRecord, gallery: &mut
     let mut shown = BTreeMap::new();
     for name in &record.suite.estimators {
         let values = match shown_instead(record, scene, name) {
-            Some(image) => layer(&read(image)?, image, "mean")?,
+            Some(case) => error_maps::mean(folder, case)?,
             None if record.handed_in.is_some() => continue,
             None => layer(&converged, &scene.image, &format!("converged-{name}"))?,
         };
@@ -227,14 +227,14 @@ fn against_judge(
 /// The image of the most rays whose mean over replicates is shown in place of the converged
 /// image: of a smoothed method, whose converged image is not smoothed, and of images that
 /// were handed in. None for others.
-fn shown_instead<'a>(record: &'a Record, scene: &SceneRecord, method: &str) -> Option<&'a str> {
+fn shown_instead<'a>(record: &'a Record, scene: &SceneRecord, method: &str) -> Option<&'a CaseRecord> {
     let file = record.suite.methods.get(method);
     let is_smoothed = file.is_some_and(|f| f.temporal.is_some() || f.denoise.is_some());
     if !is_smoothed && record.handed_in.is_none() {
         return None;
     }
     let own = record.cases.iter().filter(|c| c.case.scene == scene.name && c.case.estimator == method);
-    own.filter(|c| c.image.is_some()).max_by_key(|c| c.case.rays)?.image.as_deref()
+    own.filter(|c| c.image.is_some()).max_by_key(|c| c.case.rays)
 }
 
 /// The columns of a measure image within R of its centre, so that pictures are

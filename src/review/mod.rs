@@ -136,6 +136,8 @@ impl Review {
                 format!("Approved: {golden}.")
             }
             Decision::Reject => {
+                // What is rejected is what was seen.
+                of.layers(&self.folder)?;
                 let rejected = Rejected { case: case.to_owned(), pixel_hash: hash, reason: reason.to_owned() };
                 self.store.reject(&rejected, &|_| ())?;
                 format!("Rejected: {golden} stays as it is.")

@@ -112,7 +112,8 @@ fn with_cases(out: &Path, to: &Path, n: usize) {
     });
 }
 
-/// Changes an image; of a golden its hash too, as if it had been approved so.
+/// Changes an image, and its hash too: of a golden as if it had been approved so, in a record as
+/// if it had been measured so.
 fn mean(path: &Path, change: impl Fn(usize, f32) -> f32) {
     let mut layers = Layers::read(path).unwrap();
     for (name, values) in &mut layers.layers {
@@ -124,6 +125,15 @@ fn mean(path: &Path, change: impl Fn(usize, f32) -> f32) {
         *hash = pixel_hash(&layers.layers["mean"]);
     }
     layers.write(path).unwrap();
+    let record = path.ancestors().nth(3).unwrap();
+    if record.join("record.json").exists() {
+        let image = text(path.strip_prefix(record).unwrap());
+        edited(record, |record| {
+            for case in record["cases"].as_array_mut().unwrap().iter_mut().filter(|case| case["image"] == image) {
+                case["hash"] = json!(pixel_hash(&layers.layers["mean"]));
+            }
+        });
+    }
 }
 
 #[test]
@@ -483,6 +493,33 @@ fn a_golden_whose_pixels_were_changed_is_unusable() {
     assert!(printed.contains("UNUSABLE") && printed.contains(&approved), "{printed}");
     assert!(printed.contains("not those that were approved") && printed.contains("1 missing or unusable"), "{printed}");
     assert!(expect(3, &["golden", "list", "--goldens", text(&goldens)]).contains("1 cannot be read"));
+}
+
+/// A record whose images are not those that were measured: nobody takes one for the other.
+#[test]
+fn an_image_that_is_not_the_one_that_was_measured_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let (swapped, goldens) = (dir.path().join("swapped"), dir.path().join("goldens"));
+    copied(&RUNS.out[0], &swapped);
+    let images = swapped.join("images/scene");
+    fs::copy(images.join("denoised.cpu.4.exr"), images.join("classic.cpu.4.exr")).unwrap();
+    let (swapped, whole, goldens) = (text(&swapped), text(&RUNS.out[0]), text(&goldens));
+    const WHY: &str = "classic.cpu.4.exr: not the image that was measured: the hash of its mean is ";
+    let refused = expect(2, &["golden", "approve", swapped, "--goldens", goldens, "--reason", "x"]);
+    assert!(refused.contains(WHY) && !Path::new(goldens).exists(), "{refused}");
+    let refused = expect(2, &["report", swapped, "--format", "html", "--out", text(&dir.path().join("html"))]);
+    assert!(refused.contains(WHY), "{refused}");
+    expect(0, &["golden", "approve", whole, "--goldens", goldens, "--reason", "x"]);
+    let held = expect(5, &["golden", "verify", swapped, "--goldens", goldens]);
+    assert!(held.contains(WHY), "{held}");
+    for pair in [[whole, swapped], [swapped, whole]] {
+        let told = stdout(&["compare", pair[0], pair[1]]);
+        assert!(told.contains("not read") && told.contains(WHY), "{told}");
+    }
+    // Records are often kept without their images, which is no fault.
+    fs::remove_dir_all(images).unwrap();
+    let told = stdout(&["compare", whole, swapped]);
+    assert!(!told.contains("not read"), "{told}");
 }
 
 #[test]

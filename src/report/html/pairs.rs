@@ -169,7 +169,7 @@ impl<'a> SceneImages<'a> {
     /// Mean of a case with its noise; None where it has no image.
     fn mean(&self, case: &CaseRecord) -> Result<Option<Measured>, ReportError> {
         let Some(image) = case.image.as_deref() else { return Ok(None) };
-        let layers = Layers::read(&self.folder.join(image))?;
+        let layers = case.layers(self.folder)?;
         fits(image, layers.resolution, self.scene.resolution)?;
         let replicates = self.record.replicates(case);
         let variance = layer(&layers, image, "variance")?;
