@@ -335,7 +335,7 @@ impl Reader<'_> {
                  was done to those"
             ),
             (_, Finding::Either(_)) if self.is_checked => format!(
-                "{title}, and the image of the self-check shows none of it: save both in the same way, and look what is done to \
+                "{title}; the image of the self-check shows something else: save both in the same way, and look what is done to \
                  AO after it is traced"
             ),
             _ => finding.told(declared, Keys::Score),

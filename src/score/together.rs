@@ -52,7 +52,7 @@ pub(super) fn look(reader: &Reader<'_>, cases: &[CaseImages], checked: &Checked)
     let mut all = cases.iter().map(|case| reader.look(case)).collect::<Result<Vec<_>, _>>()?;
     let mut methods: BTreeMap<(&str, bool), Vec<usize>> = BTreeMap::new();
     for (i, case) in cases.iter().enumerate().filter(|(_, c)| c.shows() != Shows::Frame) {
-        methods.entry((&case.case.estimator, case.is_openness())).or_default().push(i);
+        methods.entry((&case.case.estimator, case.shows() == Shows::Ratio)).or_default().push(i);
     }
     for members in methods.values() {
         let held = |of: &[usize]| of.iter().flat_map(|&i| sound(&cases[i], &all[i])).collect::<Vec<_>>();

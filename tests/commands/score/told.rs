@@ -166,7 +166,7 @@ fn the_self_check_tells_what_is_wrong_with_frames() {
         let both: Vec<[f32; 2]> = image.iter().enumerate().map(|(i, a)| make(*a, light(i))).collect();
         for (k, name) in ["with", "without"].iter().enumerate() {
             let frame: Vec<f32> = both.iter().map(|p| p[k]).collect();
-            images.exr(&format!("self-check.{name}.exr"), &frame, size);
+            images.exr(&format!("self-check.classic.16.{name}.exr"), &frame, size);
         }
         let (found, text) = images.score(&[]);
         assert!(found == code && text.contains(says), "{says}: {found}: {text}");
@@ -178,7 +178,7 @@ fn the_self_check_tells_what_is_wrong_with_frames() {
     for name in ["with", "without"] {
         let value = |i: usize| if name == "with" { image[i] * light(i) } else { light(i) };
         let at = |x: u32, y: u32| image::Luma([(value((y * size[0] + x) as usize).max(0.0) * 65535.0).round() as u16]);
-        let path = images.folder.path().join(format!("self-check.{name}.png"));
+        let path = images.folder.path().join(format!("self-check.classic.16.{name}.png"));
         image::ImageBuffer::from_fn(size[0], size[1], at).save(path).unwrap();
     }
     let (code, text) = images.score(&[]);
