@@ -141,9 +141,11 @@ pub fn pair_causes(pair: &Pair<'_>, reference: &Reference, size: [usize; 2]) -> 
     let explained = tried.map(|(cause, ratio)| (cause, left(&ratio, like, size[0])));
     let other = radius(pair.ratio, reference, size[0]).filter(Radius::is_told);
     let other = other.map(|r| (PairCause::Radius(r.factor), r.left));
-    // Between two that are known, another R is not drawn so exactly.
-    let other = other.filter(|(_, left)| left[0] < NAMED * without[0]);
-    let explained: Vec<_> = explained.filter(|(_, left)| explains(*left, without)).chain(other).collect();
+    let mut explained: Vec<_> = explained.filter(|(_, left)| explains(*left, without)).collect();
+    // Between two that are known, another R is not drawn so exactly; beside what explains it all it must be as near.
+    let is_alone = explained.is_empty();
+    let is_near = |left: [f64; 2]| if is_alone { left[0] < NAMED * without[0] } else { explains(left, without) };
+    explained.extend(other.filter(|(_, left)| is_near(*left)));
     let Some(best) = explained.iter().map(|e| e.1).reduce(|a, b| if b[0] < a[0] { b } else { a }) else {
         return Some(Vec::new());
     };
