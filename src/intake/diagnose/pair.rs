@@ -152,6 +152,11 @@ pub fn pair_causes(pair: &Pair<'_>, reference: &Reference, size: [usize; 2]) -> 
     let fits = |left: [f64; 2]| left[0] - best[0] < SURE * left[1].hypot(best[1]) || !is_different(left);
     let mut all: Vec<_> = explained.into_iter().filter(|(_, left)| fits(*left)).collect();
     all.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
+    // The sRGB curve is nearly a power: of the two the nearer.
+    let is_curve = |cause: &PairCause| matches!(cause, PairCause::Codes | PairCause::Power(_));
+    if let Some(first) = all.iter().find(|(cause, _)| is_curve(cause)).map(|(cause, _)| *cause) {
+        all.retain(|(cause, _)| !is_curve(cause) || *cause == first);
+    }
     Some(all.into_iter().map(|(cause, _)| cause).collect())
 }
 
