@@ -144,7 +144,7 @@ fn the_kit_is_named_and_another_is_refused() {
 fn the_self_check_tells_what_is_wrong_with_frames() {
     type Make = fn(f32, f32) -> [f32; 2];
     let cases: [(Make, i32, &str); 6] = [
-        (|a, l| [0.97 * a * l, l], 0, "the frame with AO is 0.97 times as bright as the one without it"),
+        (|a, l| [0.97 * a * l, l], 5, "the frame with AO is 0.97 times as bright as the one without it"),
         (|a, l| [0.92 * a * l, l], 5, "the frame with AO is 0.92 times as bright as the one without it"),
         (|a, l| [(2.0 * a * l).min(0.95), (2.0 * l).min(0.95)], 5, "light cut off at 0.950"),
         (|a, l| [a * l / (a * l + 0.5), l / (l + 0.5)], 5, "a tone curve"),
