@@ -130,6 +130,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     let options = args.declared.clone();
     let options = Declaration {
         renderer: options.renderer,
+        kit: None,
         estimator: options.estimator,
         rays: options.rays,
         encoding: options.encoding,

@@ -61,13 +61,8 @@ impl Curve {
     /// [`fit_curve`].
     pub(super) fn fit(pairs: &[(&[f32], &[f32])]) -> Option<Curve> {
         let classes = classes(pairs)?;
-        let try_log = |log: f64| trial(&classes, log.exp());
-        let [low, high] = EXPONENTS.map(f64::ln);
-        let step = (high - low) / 40.0;
-        let grid = (0..=40).map(|i| low + step * f64::from(i));
-        let start = grid.map(|log| (log, try_log(log).square)).reduce(|a, b| if b.1 < a.1 { b } else { a })?.0;
-        let log = smallest([(start - step).max(low), (start + step).min(high)], |log| try_log(log).square);
-        let best = try_log(log);
+        let log = nearest(|log| trial(&classes, log.exp(), None).square)?;
+        let best = trial(&classes, log.exp(), None);
         let error = error(&classes, log, &best)?;
         let exponent = log.exp();
         let gain = best.factor.powf(-exponent);
@@ -76,6 +71,13 @@ impl Curve {
         let before = (classes.iter().map(plain).sum::<f64>() / pixels).sqrt();
         let known = error <= KNOWN && gain.is_finite() && gain > 0.0;
         known.then_some(Curve { gain, exponent, error: error * exponent, before, after: best.square.sqrt() })
+    }
+
+    /// The exponent alone, of a curve without gain, that brings images nearest to their references, as
+    /// [`fit_curve`]. None where references hardly vary, or where fewer than 64 pixels are known.
+    pub(super) fn power(pairs: &[(&[f32], &[f32])]) -> Option<f64> {
+        let classes = classes(pairs)?;
+        nearest(|log| trial(&classes, log.exp(), Some(1.0)).square).map(f64::exp)
     }
 
     /// Openness before the curve. Values below 0 become 0; nothing is clamped above.
@@ -116,14 +118,24 @@ fn classes(pairs: &[(&[f32], &[f32])]) -> Option<Vec<Class>> {
     Some(filled.map(|(sum, values)| Class { reference: sum / values.len() as f64, values }).collect())
 }
 
-fn trial(classes: &[Class], exponent: f64) -> Trial {
+/// The logarithm of the exponent that leaves least.
+fn nearest(left: impl Fn(f64) -> f64) -> Option<f64> {
+    let [low, high] = EXPONENTS.map(f64::ln);
+    let step = (high - low) / 40.0;
+    let grid = (0..=40).map(|i| low + step * f64::from(i));
+    let start = grid.map(|log| (log, left(log))).reduce(|a, b| if b.1 < a.1 { b } else { a })?.0;
+    Some(smallest([(start - step).max(low), (start + step).min(high)], left))
+}
+
+/// `known` is the factor where it is not looked for.
+fn trial(classes: &[Class], exponent: f64, known: Option<f64>) -> Trial {
     let undone =
         |c: &Class| c.values.iter().map(|v| v.max(0.0).powf(1.0 / exponent)).sum::<f64>() / c.values.len() as f64;
     let mut means: Vec<f64> = classes.iter().map(undone).collect();
     let weigh = |f: &dyn Fn(f64, f64) -> f64| {
         classes.iter().zip(&means).map(|(c, m)| c.values.len() as f64 * f(*m, c.reference)).sum::<f64>()
     };
-    let factor = weigh(&|m, r| m * r) / weigh(&|m, _| m * m);
+    let factor = known.unwrap_or_else(|| weigh(&|m, r| m * r) / weigh(&|m, _| m * m));
     let square = weigh(&|m, r| (factor * m - r).powi(2)) / weigh(&|_, _| 1.0);
     means.iter_mut().for_each(|m| *m *= factor);
     Trial { factor, square: if square.is_finite() { square } else { f64::INFINITY }, means }
@@ -147,7 +159,7 @@ fn smallest([mut low, mut high]: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
 /// against the noise of their pixels.
 fn error(classes: &[Class], log: f64, best: &Trial) -> Option<f64> {
     const STEP: f64 = 0.02;
-    let [less, more] = [-STEP, STEP].map(|d| trial(classes, (log + d).exp()));
+    let [less, more] = [-STEP, STEP].map(|d| trial(classes, (log + d).exp(), None));
     let slope = |i: usize| (more.means[i] - less.means[i]) / (2.0 * STEP);
     let exponent = log.exp();
     let (mut information, mut noise) = (0.0, 0.0);

@@ -193,11 +193,19 @@ impl<'a> Intake<'a> {
             return Err(wrong(format!("'{a}' and '{b}' are the same image: keep one of them")));
         }
         let mut files = Files::default();
+        let mut spans = Spans::default();
         for ((scene, estimator, rays), images) in self.found {
             let title = format!("{scene}, {estimator}, {rays} rays");
             let images = paired(images).map_err(|what| wrong(format!("{title}: {what}")))?;
-            files.warnings.extend(missing(&images).map(|what| format!("{title}: {what}")));
-            files.cases.push(Handed { scene, estimator, rays, images });
+            let handed = Handed { scene, estimator, rays, images };
+            spans.add(&handed);
+            files.cases.push(handed);
+        }
+        let misnamed: Vec<&str> = self.unknown.values().flatten().filter_map(|p| file_name(p)).collect();
+        for handed in &files.cases {
+            let Handed { scene, estimator, rays, .. } = handed;
+            let what = missing(handed, &spans, &misnamed);
+            files.warnings.extend(what.map(|what| format!("{scene}, {estimator}, {rays} rays: {what}")));
         }
         let names = |paths: &[PathBuf]| {
             let mut names: Vec<String> =
@@ -253,13 +261,42 @@ fn paired(mut files: BTreeMap<(Option<u32>, Shown), PathBuf>) -> Result<Vec<Hand
     Ok(images)
 }
 
-/// Which numbers of replicates are not there, between the first and the last.
-fn missing(images: &[HandedImage]) -> Option<String> {
-    let numbers: Vec<u32> = images.iter().filter_map(|i| i.replicate).collect();
-    let (first, last) = (*numbers.first()?, *numbers.last()?);
+/// The least and the greatest number of a replicate that cases of an estimator and a ray count have.
+#[derive(Default)]
+struct Spans(BTreeMap<(String, u32), [u32; 2]>);
+
+impl Spans {
+    fn add(&mut self, handed: &Handed) {
+        for number in handed.images.iter().filter_map(|i| i.replicate) {
+            let key = (handed.estimator.clone(), handed.rays);
+            let span = self.0.entry(key).or_insert([number; 2]);
+            *span = [span[0].min(number), span[1].max(number)];
+        }
+    }
+}
+
+/// Which numbers of replicates are not there: between the first and the last, before the first where other scenes have
+/// those, and where an image of the scene was not taken, so that its name may be wrong, as far as other scenes go and from 0.
+fn missing(handed: &Handed, spans: &Spans, misnamed: &[&str]) -> Option<String> {
+    let numbers: Vec<u32> = handed.images.iter().filter_map(|i| i.replicate).collect();
+    let (mut first, mut last) = (*numbers.first()?, *numbers.last()?);
+    if let Some([least, most]) = spans.0.get(&(handed.estimator.clone(), handed.rays)) {
+        let is_misnamed = misnamed.iter().any(|name| is_nearly_of(name, &handed.scene));
+        first = first.min(*least);
+        if is_misnamed {
+            (first, last) = (if first == 1 { 0 } else { first }, *most);
+        }
+    }
     let lacking = u64::from(last - first) + 1 - numbers.len() as u64;
-    let gap = numbers.windows(2).find(|n| n[1] - n[0] > 1)?;
-    Some(format!("{lacking} of the replicates {first} to {last} are missing, the first is {}", gap[0] + 1))
+    let gap = numbers.windows(2).find(|n| n[1] - n[0] > 1).map(|n| n[0] + 1);
+    let gap = if numbers[0] > first { first } else { gap.or_else(|| numbers.last().map(|n| n + 1))? };
+    (lacking > 0).then(|| format!("{lacking} of the replicates {first} to {last} are missing, the first is {gap}"))
+}
+
+/// Whether a name begins like a scene, whatever its case and the strokes in it.
+fn is_nearly_of(name: &str, scene: &str) -> bool {
+    let plain = |text: &str| text.replace(['_', ' '], "-").to_ascii_lowercase();
+    plain(name).starts_with(&plain(scene))
 }
 
 #[cfg(test)]
@@ -362,6 +399,30 @@ mod tests {
         let warnings = plain(&gaps).unwrap().warnings;
         assert!(warnings[0].contains("4294967292 of the replicates 1 to 4294967295 are missing"), "{warnings:?}");
         assert!(warnings[0].ends_with("the first is 3"), "{warnings:?}");
+    }
+
+    /// A slip in the name of the first or last image leaves no gap between the others.
+    #[test]
+    fn replicates_that_are_missing_at_an_end_are_named() {
+        let all = |scene: &str, numbers: std::ops::Range<u32>| {
+            numbers.map(|n| format!("{scene}.classic.4.{n:04}.exr")).collect::<Vec<_>>()
+        };
+        let told = |names: &[Vec<String>]| {
+            let names: Vec<&str> = names.iter().flatten().map(String::as_str).collect();
+            plain(&names).unwrap().warnings.into_iter().filter(|w| w.contains("missing")).collect::<Vec<_>>()
+        };
+        let misnamed = |name: &str| vec![name.to_owned()];
+        let says = "curtain, classic, 4 rays: 1 of the replicates 0 to 7 are missing, the first is 0";
+        assert_eq!(told(&[all("curtain", 1..8), misnamed("Curtain.classic.4.0000.exr")]), [says]);
+        assert_eq!(told(&[all("curtain", 1..8), misnamed("curtain.classic.four.0000.exr")]), [says]);
+        assert_eq!(told(&[all("curtain", 1..8), all("curtain.open", 0..8)]), [says]);
+        let says = "curtain.open, classic, 4 rays: 1 of the replicates 0 to 7 are missing, the first is 7";
+        let last = misnamed("curtain.Open.classic.4.0007.exr");
+        assert_eq!(told(&[all("curtain", 0..8), all("curtain.open", 0..7), last]), [says]);
+        // Whoever counts from 1, or has fewer of some scene, has made no slip.
+        assert_eq!(told(&[all("curtain", 1..9), all("curtain.open", 1..9)]), [""; 0]);
+        assert_eq!(told(&[all("curtain", 0..8), all("curtain.open", 0..4)]), [""; 0]);
+        assert_eq!(told(&[all("curtain", 1..9), misnamed("room.classic.4.0000.exr")]), [""; 0]);
     }
 
     #[test]

@@ -17,7 +17,8 @@ pub use curve::{Curve, fit_curve};
 pub use declared::{Declared, Means, Rows, Share, Upsample};
 pub use detect::{Evidence, evidence};
 pub use diagnose::{
-    Cause, Disagreement, FACTORS, Finding, Reference, Scaled, Turn, agreement, alike, diagnose, frame_turn, is_rather,
+    Cause, Disagreement, FACTORS, Finding, Held, Pair, PairCause, Reference, Scaled, Turn, agree, agreement, alike,
+    diagnose, frame_turn, is_rather, meaning_of, pair_causes,
 };
 pub use files::{Defaults, Files, Handed, HandedImage, files};
 pub use name::Shown;

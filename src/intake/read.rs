@@ -1,6 +1,6 @@
 //! One file becomes openness at the size of a view.
 
-use super::{Declared, IntakeError, Means, Rows, Share, upsample::upsample};
+use super::{Declared, IntakeError, Means, Rows, Share, diagnose::number, upsample::upsample};
 use crate::{
     disk::DiskError,
     layers::{linear, load},
@@ -171,24 +171,29 @@ fn openness(
         let light = if encoding == Encoding::Srgb { linear(*v) } else { *v };
         *v = if declared.means == Means::Occlusion { 1.0 - light } else { light };
     }
-    if let Some(why) = beyond(&values) {
-        warnings.push(why);
-    }
     if declared.rows == Rows::Bottom {
         values = values.chunks_exact(size[0]).rev().flatten().copied().collect();
+    }
+    if let Some(why) = beyond(&values, size[0]) {
+        warnings.push(why);
     }
     let view = view.map(|side| side as usize);
     Ok(if size == view { values } else { upsample(&values, size, view, declared.upsample) })
 }
 
-/// Says where openness leaves its range.
-fn beyond(values: &[f32]) -> Option<String> {
-    let is_beyond = |v: &&f32| v.is_finite() && !(-BEYOND..=1.0 + BEYOND).contains(*v);
-    let count = values.iter().filter(is_beyond).count();
+/// Says where openness leaves its range, by how many pixels and which is the farthest.
+fn beyond(values: &[f32], width: usize) -> Option<String> {
+    let far = |v: f32| if v < 0.5 { -v } else { v - 1.0 };
+    let beyond = || values.iter().enumerate().filter(|(_, v)| v.is_finite() && far(**v) > BEYOND);
+    let farthest = beyond().map(|(i, v)| (i, far(*v))).reduce(|a, b| if b.1 > a.1 { b } else { a })?.0;
+    let count = beyond().count();
     let finite = || values.iter().copied().filter(|v| v.is_finite());
-    let least = finite().fold(f32::INFINITY, f32::min);
-    let most = finite().fold(f32::NEG_INFINITY, f32::max);
-    (count > 0).then(|| format!("openness lies outside 0 to 1 at {count} pixels: it is {least} to {most}"))
+    let [least, most] = [finite().fold(f32::INFINITY, f32::min), finite().fold(f32::NEG_INFINITY, f32::max)];
+    let [least, most] = [least, most].map(number);
+    let [x, y] = [farthest % width.max(1), farthest / width.max(1)];
+    Some(format!(
+        "openness lies outside 0 to 1 at {count} pixels: it is {least} to {most}, farthest at column {x}, row {y}"
+    ))
 }
 
 /// The one plane of an image whose channels are alike.

@@ -10,8 +10,6 @@ use crate::{layers::code, metrics::image::Encoding};
 /// The other encoding must bring an image so much nearer to its reference, in mean square, that the
 /// declared one is wrong.
 const NEARER: f64 = 0.2;
-/// A curve whose exponent is so many times more or less than 1 is a factor.
-const MOST_BENT: f64 = 1.05;
 
 /// Where it is declared what images are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,16 +46,7 @@ impl IntakeError {
 /// are [`Finding::Decoded`], and not the curve that decoding makes of them.
 pub fn examine(image: &[f32], reference: &Reference, size: [usize; 2], declared: &Declared) -> Vec<Finding> {
     let mut found = diagnose(image, reference, size);
-    let is_meaning = |f: &Finding| {
-        matches!(
-            f,
-            Finding::Curve { .. }
-                | Finding::Strength { .. }
-                | Finding::Encoded { .. }
-                | Finding::Scaled { .. }
-                | Finding::Between { .. }
-        )
-    };
+    let is_meaning = |f: &Finding| f.is_meaning() || matches!(f, Finding::Scaled { .. } | Finding::Between { .. });
     if declared.encoding != Some(Encoding::Srgb) || !found.iter().any(is_meaning) {
         return found;
     }
@@ -79,29 +68,15 @@ impl Finding {
         }
         let remedy = match (keys, self) {
             (Keys::Score, _) => self.remedy(),
-            (Keys::Suite, Finding::Encoded { gamma: Some(_), .. }) => {
-                "save the buffer without a view transform".to_owned()
-            }
+            (Keys::Suite, Finding::Encoded { gamma: Some(_) }) => "save the buffer without a view transform".to_owned(),
             (Keys::Suite, Finding::Curve { .. }) => "set intensity and power of the AO to 1".to_owned(),
+            (Keys::Suite, Finding::Either(_)) => {
+                "look what is done to AO after it is traced; `aogauge score` with an image of the self-check can"
+                    .to_owned()
+            }
             (Keys::Suite, _) => self.remedy().replace("declare `", "declare `image."),
         };
         format!("{}; {remedy}", self.title())
-    }
-
-    /// What a factor or a curve of a ratio of frames comes from, and whether that is an exposure.
-    pub fn of_frames(&self) -> Option<(String, bool)> {
-        let Finding::Curve { gain, exponent } = self else { return None };
-        let is_exposure = (exponent.ln()).abs() < MOST_BENT.ln();
-        let why = match is_exposure {
-            true => format!(
-                "exposure: where nothing occludes, the frame with AO is {gain:.2} times as bright as the one without it; \
-                 save both with the same exposure"
-            ),
-            false => {
-                format!("{}: AO is a factor in linear light alone; save both frames before tone mapping", self.title())
-            }
-        };
-        Some((why, is_exposure))
     }
 
     /// What is declared and is wrong, where that is the cause: to declare it would be no remedy.
@@ -120,7 +95,7 @@ impl Finding {
                 "{}, after it was decoded as declared: it was encoded twice; save the buffer without a view transform",
                 self.title()
             ),
-            (Finding::Encoded { gamma: None, .. }, Some(Encoding::Linear)) => format!(
+            (Finding::Encoded { gamma: None }, Some(Encoding::Linear)) => format!(
                 "{}, though `{} = \"linear\"` is declared: one of the two is wrong, unless AO is meant to be so",
                 self.title(),
                 keys.of("encoding")
@@ -145,7 +120,7 @@ mod tests {
             rows: Rows::Bottom,
             ..Declared::default()
         };
-        let encoded = Finding::Encoded { gamma: None, strength: None };
+        let encoded = Finding::Encoded { gamma: None };
         for (finding, says) in [
             (Finding::Inverted, "looks like openness: take `image.means = \"occlusion\"` away"),
             (Finding::Turned(Turn::FlippedY), "take `image.rows = \"bottom\"` away"),

@@ -22,6 +22,9 @@ pub struct Manifest {
     pub tool: String,
     /// The suite.
     pub suite: String,
+    /// What the kit is called by: another kit of the same suite, of another seed or version, has another one. Scoring
+    /// names it, and `kit` in `score.toml` asks for it.
+    pub id: String,
     /// Primary rays a pixel that the suite asks for.
     pub rays: Vec<u32>,
     /// Independent images a case that the suite asks for, each with its seed.
@@ -101,11 +104,12 @@ pub struct ManifestScene {
 
 impl Manifest {
     /// That of a suite's kit.
-    pub(super) fn new(suite: &Suite, self_check: ManifestSelfCheck, scenes: Vec<ManifestScene>) -> Self {
+    pub(super) fn new(suite: &Suite, id: &str, self_check: ManifestSelfCheck, scenes: Vec<ManifestScene>) -> Self {
         Manifest {
             version: VERSION,
             tool: env!("CARGO_PKG_VERSION").to_owned(),
             suite: suite.name.clone(),
+            id: id.to_owned(),
             rays: suite.file.rays.iter().map(|r| r.get()).collect(),
             replicates: suite.file.replicates.get(),
             estimators: suite.methods.iter().map(|m| (m.name.clone(), EstimatorFile::of(&m.estimator))).collect(),

@@ -63,9 +63,11 @@ pub fn write_suite(
     for scene in &suite.scenes {
         scene::write(scene, &folder.join(SCENES).join(&scene.name))?;
     }
+    let id = references.id().to_owned();
     let scenes = references.scenes.into_iter();
     let manifest = Manifest::new(
         suite,
+        &id,
         ManifestSelfCheck::new(SCENES, &check),
         scenes.map(|s| ManifestScene::new(SCENES, s.facts)).collect(),
     );

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct HandedIn {
     /// The renderer's name.
     pub renderer: String,
-    /// The kit that it was scored against: the version of aogauge that wrote it.
+    /// The kit that it was scored against: what it is called by, and the version of aogauge that wrote it, suite and seed.
     pub kit: String,
     /// What was undone in all images: openness was seen as gain * O^exponent.
     #[serde(skip_serializing_if = "Option::is_none", default)]

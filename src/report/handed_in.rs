@@ -6,7 +6,7 @@ use crate::record::{Intervals, Record, Shows};
 pub fn notes(record: &Record) -> Vec<String> {
     let Some(by) = &record.handed_in else { return record.doubts() };
     let mut notes = vec![format!(
-        "These are images of the renderer '{}', handed in and scored against a kit ({}). Nothing was rendered here; pictures \
+        "These are images of the renderer '{}', handed in and scored against the kit {}. Nothing was rendered here; pictures \
          from the look view are the kit's own.",
         by.renderer, by.kit
     )];

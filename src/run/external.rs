@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     disk::{DiskError, write_whole},
-    intake::{Declared, Finding, Keys, Reference, examine},
+    intake::{Declared, Finding, Held, Keys, Reference, agree, examine, meaning_of},
     layers::pixel_hash,
     metrics::regions::Regions,
     render::{
@@ -45,9 +45,19 @@ pub(super) fn diagnosed(
 ) -> [Vec<String>; 2] {
     let reference = Reference::over(converged, regions);
     let (mut wrong, mut doubtful) = (Vec::new(), Vec::new());
-    for (replicate, image) in images.iter().enumerate() {
-        for finding in examine(image, &reference, size.map(|side| side as usize), declared) {
-            let is_declared = declared.encoding.is_some() && matches!(finding, Finding::Encoded { .. });
+    let view = size.map(|side| side as usize);
+    let mut findings: Vec<_> = images.iter().map(|image| examine(image, &reference, view, declared)).collect();
+    // One command makes all of them in one way.
+    let held: Vec<Held<'_>> =
+        images.iter().map(|image| Held { image, reference: &reference.openness, width: view[0] }).collect();
+    if findings.iter().flatten().any(Finding::is_meaning)
+        && let Some(shared) = meaning_of(&held)
+    {
+        agree(&mut findings, &shared);
+    }
+    for (replicate, findings) in findings.into_iter().enumerate() {
+        for finding in findings {
+            let is_declared = declared.encoding.is_some() && finding.is_encoded();
             let told = finding.told(declared, Keys::Suite);
             if !finding.is_doubt() && !is_declared {
                 wrong.push(format!("replicate {replicate}: {told}"));

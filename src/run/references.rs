@@ -65,6 +65,11 @@ pub struct ReferencesFile {
 }
 
 impl ReferencesFile {
+    /// What a kit is called by, so that another is told from it: the first twelve digits of [`ReferencesFile::sha256`].
+    pub fn id(&self) -> &str {
+        self.sha256.get(..12).unwrap_or(&self.sha256)
+    }
+
     /// What [`ReferencesFile::sha256`] must be.
     fn seal(&self) -> Result<String, serde_json::Error> {
         let plain = ReferencesFile { sha256: String::new(), ..self.clone() };

@@ -17,7 +17,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The file, in the folder of the images. Each field is an option of `aogauge score` too,
+/// The file, in the folder of the images. Each field but `kit` is an option of `aogauge score` too,
 /// which wins.
 pub const FILE: &str = "score.toml";
 
@@ -28,6 +28,8 @@ pub struct Declaration {
     /// Name of the renderer in the record: 1 to 64 letters, digits, `-`, `_` and `.`. That of the folder,
     /// unless given.
     pub renderer: Option<String>,
+    /// The kit that the images were rendered for, `id` in its `kit.json`: no other is taken. Any, unless given.
+    pub kit: Option<String>,
     /// The estimator of images whose names do not say it.
     pub estimator: Option<String>,
     /// Their rays a pixel.
@@ -149,6 +151,7 @@ impl Declaration {
     pub fn or_else(self, other: Declaration) -> Declaration {
         Declaration {
             renderer: self.renderer.or(other.renderer),
+            kit: self.kit.or(other.kit),
             estimator: self.estimator.or(other.estimator),
             rays: self.rays.or(other.rays),
             encoding: self.encoding.or(other.encoding),

@@ -6,6 +6,7 @@ mod declaration;
 mod encoding;
 mod reading;
 pub mod self_check;
+mod together;
 
 pub use declaration::{CurveChoice, Declaration, FILE, Fit, KnownCurve};
 
@@ -17,7 +18,7 @@ use crate::{
     suite::{Case, is_taken},
 };
 use encoding::Encodings;
-use reading::Reader;
+use reading::{Curved, Reader};
 use self_check::SCENE as SELF_CHECK;
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -56,6 +57,17 @@ pub enum ScoreError {
     Curve(String),
 }
 
+impl ScoreError {
+    /// With what is to be said of the images besides, where the self-check ended it all.
+    fn with(self, warnings: &[String]) -> Self {
+        match self {
+            ScoreError::SelfCheck(what) => ScoreError::SelfCheck(lines(what, warnings)),
+            ScoreError::Disagrees(what) => ScoreError::Disagrees(lines(what, warnings)),
+            other => other,
+        }
+    }
+}
+
 /// What was found in a folder.
 #[derive(Clone, Debug)]
 pub struct Gathered {
@@ -79,6 +91,7 @@ pub fn gather(
 ) -> Result<Gathered, ScoreError> {
     declaration.check().map_err(ScoreError::Declared)?;
     let file = references.file();
+    check_kit(declaration, references)?;
     let mut scenes: Vec<&str> = file.scenes.iter().map(|s| s.facts.name.as_str()).collect();
     scenes.push(SELF_CHECK);
     let estimators: Vec<&str> = references.suite().methods.iter().map(|m| m.name.as_str()).collect();
@@ -86,19 +99,17 @@ pub fn gather(
     let defaults = Defaults { estimator: declaration.estimator.clone(), rays: declaration.rays, free };
     let found = intake::files(folder, &scenes, &estimators, &defaults)?;
     let mut warnings = found.warnings;
-    // A curve that is found on the images later explains codes, too.
-    let is_fitted = matches!(declaration.curve, Some(CurveChoice::Fit(_)));
-    let declared = declaration.of_images();
-    let mut reader = Reader { folder, references, declared, encodings: Encodings::default(), is_declared: is_fitted };
+    let mut reader = reader(folder, references, declaration);
     let (encodings, taken) = Encodings::find(&reader, &found.cases, &|h| reader.expected(h))?;
     reader.encodings = encodings;
     warnings.extend(taken);
     let (checks, handed): (Vec<_>, Vec<_>) = found.cases.into_iter().partition(|c| c.scene == SELF_CHECK);
+    reader.is_checked = !checks.is_empty();
     let known = match &declaration.curve {
         Some(CurveChoice::Known(known)) => Some(known.curve()),
         _ => None,
     };
-    let doubts = self_check::check(&reader, known, &checks)?;
+    let mut checked = self_check::check(&reader, known, &checks).map_err(|e| e.with(&warnings))?;
     reader.is_declared = declaration.encoding.is_some();
     check_taken(folder, &scenes[..scenes.len() - 1], &handed, (found.not_taken, is_partial), &warnings)?;
     check_used(declaration, &handed).map_err(ScoreError::Declared)?;
@@ -107,19 +118,18 @@ pub fn gather(
         warnings
             .push(format!("The estimator '{own}' is none of the kit's ({known}): of it there is no converged image."));
     }
-    let renderer = match &declaration.renderer {
-        Some(name) => name.clone(),
-        None => {
-            let (name, told) = name_of(folder);
-            warnings.extend(told);
-            name
-        }
-    };
-    warnings.extend(doubts);
-    let mut cases: Vec<CaseImages> = handed.iter().map(|h| reader.case(h, &renderer)).collect();
+    let (renderer, told) = declaration.renderer.clone().map_or_else(|| name_of(folder), |name| (name, None));
+    warnings.extend(told);
+    warnings.append(&mut checked.doubts);
+    let (mut cases, causes): (Vec<CaseImages>, Vec<_>) = handed.iter().map(|h| reader.case(h, &renderer)).unzip();
     let curve = undo_curve(&mut cases, references, declaration)?;
-    for case in &mut cases {
-        reader.diagnose(case)?;
+    if let Some(undone) = curve.as_ref().filter(|_| reader.curve == Curved::Unfitted) {
+        reader.curve = Curved::Fitted;
+        warnings.extend(self_check::check_fitted(&reader, undone, &checks));
+    }
+    let looked = together::look(&reader, &cases, &checked)?;
+    for ((case, looked), causes) in cases.iter_mut().zip(&looked).zip(&causes) {
+        reader.diagnose(case, looked, causes.as_deref())?;
     }
     if !is_partial {
         let strays = strays(&handed);
@@ -127,8 +137,38 @@ pub fn gather(
         let strays: Vec<(&str, u32)> = strays.iter().map(|h| (h.estimator.as_str(), h.rays)).collect();
         cases.extend(missing(&cases, references, &strays));
     }
-    let kit = format!("aogauge {}, suite {}, seed {}", file.tool, file.suite, file.seed);
+    let kit = format!("{}, aogauge {}, suite {}, seed {}", file.id(), file.tool, file.suite, file.seed);
     Ok(Gathered { cases, handed_in: HandedIn { renderer, kit, curve, warnings } })
+}
+
+/// Reads images of which nothing is known yet but what is declared.
+fn reader<'a>(folder: &'a Path, references: &'a References, declaration: &Declaration) -> Reader<'a> {
+    let curve = match &declaration.curve {
+        None => Curved::No,
+        Some(CurveChoice::Fit(_)) => Curved::Unfitted,
+        Some(CurveChoice::Known(_)) => Curved::Known,
+    };
+    Reader {
+        folder,
+        references,
+        declared: declaration.of_images(),
+        encodings: Encodings::default(),
+        // A curve that is found on the images later explains codes, too.
+        is_declared: curve == Curved::Unfitted,
+        curve,
+        is_checked: false,
+    }
+}
+
+/// Refuses a kit that is not the one that is declared.
+fn check_kit(declaration: &Declaration, references: &References) -> Result<(), ScoreError> {
+    let file = references.file();
+    let Some(kit) = declaration.kit.as_deref().filter(|kit| *kit != file.id()) else { return Ok(()) };
+    let [kit, id, suite] = [kit, file.id(), &file.suite].map(crate::untrusted::line);
+    Err(ScoreError::Declared(format!(
+        "kit is '{kit}' in {FILE}, but the kit that the images were to be scored against is '{id}', of suite {suite}: score them \
+         against the kit that they were rendered for"
+    )))
 }
 
 /// Refuses a folder without an image of the kit's scenes, and images that are not taken: a slip in a name

@@ -1,9 +1,11 @@
 //! The images of one case, from its files.
 
-use super::{ScoreError, encoding::Encodings, self_check};
+use super::{ScoreError, encoding::Encodings, self_check, together::Looked};
 use crate::{
     disk::DiskError,
-    intake::{self, Declared, Finding, Handed, HandedImage, IntakeError, Keys, Means, Reference, Shown},
+    intake::{
+        self, Declared, Finding, Handed, HandedImage, IntakeError, Keys, Means, Pair, PairCause, Reference, Shown,
+    },
     record::{Intervals, Shows, Source, told_once},
     run::{CaseImages, References},
     suite::Case,
@@ -19,6 +21,24 @@ pub(super) struct Reader<'a> {
     pub encodings: Encodings,
     /// Whether codes that are not linear are meant to be so.
     pub is_declared: bool,
+    /// What is declared of a curve.
+    pub curve: Curved,
+    /// Whether an image of the self-check was handed in.
+    pub is_checked: bool,
+}
+
+/// What is declared of a curve, and whether it is undone by now.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Curved {
+    /// Nothing.
+    #[default]
+    No,
+    /// It is yet to be found: until then, what it does is no fault.
+    Unfitted,
+    /// It was found on the control scenes and is undone.
+    Fitted,
+    /// It was declared and is undone.
+    Known,
 }
 
 /// The size that an image should have and what it should show, where a kit tells.
@@ -31,6 +51,8 @@ pub(super) struct Read {
     encoding: String,
     /// What there is to say of it, with the file.
     pub warnings: Vec<(PathBuf, String)>,
+    /// Of a pair whose ratio is not as it should be: what explains that, the nearest first.
+    pub causes: Option<Vec<PairCause>>,
 }
 
 /// What is wrong with images as a whole, and what is doubtful.
@@ -52,8 +74,9 @@ pub(super) fn shows(shown: Option<Shown>) -> Shows {
 }
 
 impl Reader<'_> {
-    /// The images of a case, or why they cannot be used.
-    pub fn case(&self, handed: &Handed, renderer: &str) -> CaseImages {
+    /// The images of a case, or why they cannot be used; what explains the first pair of frames whose ratio is not as
+    /// it should be.
+    pub fn case(&self, handed: &Handed, renderer: &str) -> (CaseImages, Option<Vec<PairCause>>) {
         let case = Case {
             scene: handed.scene.clone(),
             estimator: handed.estimator.clone(),
@@ -63,14 +86,18 @@ impl Reader<'_> {
         let shows = shows(handed.images.first().map(|i| i.shown));
         let files = handed.images.iter().flat_map(|i| [Some(&i.path), i.without.as_ref()].into_iter().flatten());
         let files = files.map(|path| self.relative(path)).collect();
+        let mut causes = None;
         let (images, encoding, warnings) = match self.all(handed) {
-            Ok(read) => (Ok(read.images), read.encoding, self.told(&read.warnings, handed.images.len())),
+            Ok(read) => {
+                causes = read.causes;
+                (Ok(read.images), read.encoding, self.told(&read.warnings, handed.images.len()))
+            }
             Err(e) => (Err(e.to_string()), String::new(), Vec::new()),
         };
         let is_one = images.as_ref().is_ok_and(|i| i.len() == 1);
         let intervals = if is_one { Intervals::Tiles } else { Intervals::Replicates };
         let read_as = self.read_as(shows, &encoding);
-        CaseImages { case, images, source: Some(Source { files, shows, read_as, intervals, warnings }) }
+        (CaseImages { case, images, source: Some(Source { files, shows, read_as, intervals, warnings }) }, causes)
     }
 
     fn relative(&self, path: &Path) -> String {
@@ -104,12 +131,13 @@ impl Reader<'_> {
         };
         let view = scene.facts.resolution;
         let reference = self.reference(&handed.scene, &handed.estimator)?;
-        let mut all = Read { images: Vec::new(), encoding: String::new(), warnings: Vec::new() };
+        let mut all = Read { images: Vec::new(), encoding: String::new(), warnings: Vec::new(), causes: None };
         for image in &handed.images {
             let read = self.image(image, &handed.estimator, view, &reference)?;
             all.images.extend(read.images);
             all.encoding = read.encoding;
             all.warnings.extend(read.warnings);
+            all.causes = all.causes.or(read.causes);
         }
         Ok(all)
     }
@@ -123,7 +151,7 @@ impl Reader<'_> {
         view: [u32; 2],
         reference: &Reference,
     ) -> Result<Read, ScoreError> {
-        let mut warnings = Vec::new();
+        let (mut warnings, mut causes) = (Vec::new(), None);
         let mut warn = |path: &Path, text: String| warnings.push((path.to_owned(), text));
         let frame = |path: &Path| {
             let frame = intake::frame(path, &self.declared, view)?;
@@ -145,7 +173,10 @@ impl Reader<'_> {
                 with.warnings.iter().for_each(|w| warn(&image.path, w.clone()));
                 without.warnings.iter().for_each(|w| warn(beside, w.clone()));
                 ratio.remarks().into_iter().for_each(|w| warn(&image.path, w));
-                (vec![ratio.openness], with.encoding)
+                let encoding = with.encoding;
+                let pair = Pair { with: &with.light, without: &without.light, ratio: &ratio.openness, encoding };
+                causes = intake::pair_causes(&pair, reference, view.map(|side| side as usize));
+                (vec![ratio.openness], encoding)
             }
             _ => {
                 let frame = frame(&image.path)?;
@@ -154,7 +185,7 @@ impl Reader<'_> {
                 (vec![frame.light], frame.encoding)
             }
         };
-        Ok(Read { images, encoding: encoding.label().to_owned(), warnings })
+        Ok(Read { images, encoding: encoding.label().to_owned(), warnings, causes })
     }
 
     /// The size of the view and what images of a case look like; None where the kit has no such scene.
@@ -181,27 +212,53 @@ impl Reader<'_> {
         Ok(Reference::over(&converged.mean, &self.references.regions(scene)?))
     }
 
-    /// Ends a case whose images are wrong as a whole, and notes what is doubtful.
-    pub fn diagnose(&self, case: &mut CaseImages) -> Result<(), ScoreError> {
-        let Ok(images) = &case.images else { return Ok(()) };
-        let Some(scene) = self.references.scene(&case.case.scene) else { return Ok(()) };
+    /// What is found of the images of a case, one by one.
+    pub fn look(&self, case: &CaseImages) -> Result<Looked, DiskError> {
+        let (Ok(images), Some(scene)) = (&case.images, self.references.scene(&case.case.scene)) else {
+            return Ok(Looked::default());
+        };
         let reference = self.reference(&case.case.scene, &case.case.estimator)?;
         let size = scene.facts.resolution.map(|side| side as usize);
         let shows = case.shows();
+        let of = |image: &Vec<f32>| match shows {
+            Shows::Frame => Vec::new(),
+            _ => intake::examine(image, &reference, size, &self.declared_of(shows)),
+        };
+        let findings = images.iter().map(of).collect();
+        Ok(Looked { reference, size, findings, shared: None })
+    }
+
+    /// Frames are no occlusion, whatever is declared of AO.
+    fn declared_of(&self, shows: Shows) -> Declared {
+        let means = if shows == Shows::Ratio { Means::Openness } else { self.declared.means };
+        Declared { means, ..self.declared.clone() }
+    }
+
+    /// Ends a case whose images are wrong as a whole, and notes what is doubtful.
+    pub fn diagnose(
+        &self,
+        case: &mut CaseImages,
+        looked: &Looked,
+        causes: Option<&[PairCause]>,
+    ) -> Result<(), ScoreError> {
+        let Ok(images) = &case.images else { return Ok(()) };
+        let Some(scene) = self.references.scene(&case.case.scene) else { return Ok(()) };
+        let Looked { reference, size, findings, .. } = looked;
+        let shows = case.shows();
         let light = if shows == Shows::Frame { self.references.light(scene)? } else { None };
         let mut found = Diagnosis::default();
-        for (number, image) in images.iter().enumerate() {
+        for (number, (image, findings)) in images.iter().zip(findings).enumerate() {
             let mut own = match shows {
-                Shows::Frame => of_frame(image, &reference, light.as_deref(), size),
-                _ => self.of_openness(image, &reference, size, shows),
+                Shows::Frame => of_frame(image, reference, light.as_deref(), *size),
+                _ => self.judged(findings.clone(), shows, causes),
             };
             // What is doubtful is so in all of them.
             match number {
-                0 => own.doubtful.extend(self.apart(image, case, &reference, &own, size)),
+                0 => own.doubtful.extend(self.apart(image, case, looked, &own, causes)),
                 _ => own.doubtful.clear(),
             }
             if shows != Shows::Frame
-                && let Some(other) = self.rather(image, case, &reference)?
+                && let Some(other) = self.rather(image, case, reference)?
             {
                 // What else is said of it compares it with the wrong scene.
                 own.wrong.retain(|w| w.starts_with("constant"));
@@ -223,31 +280,66 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// What is wrong with openness. Where a ratio is not known, nothing is missing. Codes are doubtful alone
-    /// where it is declared what numbers stand for.
-    pub fn of_openness(&self, image: &[f32], reference: &Reference, size: [usize; 2], shows: Shows) -> Diagnosis {
-        let mut found = Diagnosis::default();
-        // Frames are no occlusion, whatever is declared of AO.
-        let means = if shows == Shows::Ratio { Means::Openness } else { self.declared.means };
-        let declared = Declared { means, ..self.declared.clone() };
-        found.findings = intake::examine(image, reference, size, &declared);
+    /// What is wrong with openness.
+    pub fn of_openness(
+        &self,
+        image: &[f32],
+        reference: &Reference,
+        size: [usize; 2],
+        shows: Shows,
+        causes: Option<&[PairCause]>,
+    ) -> Diagnosis {
+        self.judged(intake::examine(image, reference, size, &self.declared_of(shows)), shows, causes)
+    }
+
+    /// What was found, as what is wrong and what is doubtful. Where a ratio is not known, nothing is missing. Codes are
+    /// doubtful alone where it is declared what numbers stand for.
+    fn judged(&self, findings: Vec<Finding>, shows: Shows, causes: Option<&[PairCause]>) -> Diagnosis {
+        let mut found = Diagnosis { findings, ..Diagnosis::default() };
+        let declared = self.declared_of(shows);
         for finding in &found.findings {
-            if shows == Shows::Ratio && matches!(finding, Finding::Holes { .. }) {
+            let is_ratio = shows == Shows::Ratio;
+            if is_ratio && matches!(finding, Finding::Holes { .. }) {
                 continue;
             }
-            if let (Shows::Ratio, Some((why, is_exposure))) = (shows, finding.of_frames()) {
-                let to = if is_exposure { &mut found.wrong } else { &mut found.doubtful };
-                to.push(why);
+            if self.curve == Curved::Unfitted && finding.is_meaning() {
+                continue;
+            }
+            let is_value = finding.is_meaning() || matches!(finding, Finding::Scaled { .. } | Finding::Between { .. });
+            if is_ratio && is_value && self.curve == Curved::No && causes.is_some_and(|c| !c.is_empty()) {
+                let causes = causes.unwrap_or_default();
+                let is_meant = self.is_declared && !matches!(causes[..], [PairCause::Exposure(_), ..]);
+                let is_wrong = (causes[0].is_wrong() || !finding.is_doubt()) && !is_meant || !finding.is_meaning();
+                let to = if is_wrong { &mut found.wrong } else { &mut found.doubtful };
+                to.push(of_pair(causes));
                 continue;
             }
             // Where a frame is nearly dark, noise alone brings a ratio beyond its range.
-            let is_noise = shows == Shows::Ratio && matches!(finding, Finding::Range { scale: None, .. });
-            let is_declared = matches!(finding, Finding::Encoded { .. }) && self.is_declared;
-            let is_doubt = finding.is_doubt() || is_declared || is_noise;
+            let is_noise = is_ratio && matches!(finding, Finding::Range { scale: None, .. });
+            let is_doubt = finding.is_doubt() || finding.is_encoded() && self.is_declared || is_noise;
             let to = if is_doubt { &mut found.doubtful } else { &mut found.wrong };
-            to.push(finding.told(&declared, Keys::Score));
+            to.push(self.sentence(finding, &declared));
         }
         found
+    }
+
+    /// What was found and what to do about it, by what is declared and handed in.
+    fn sentence(&self, finding: &Finding, declared: &Declared) -> String {
+        let title = finding.title();
+        match (self.curve, finding) {
+            (Curved::Known, f) if f.is_meaning() => format!(
+                "{title}, with the declared curve undone: correct `curve`, declare `curve = \"fit\"`, or take it away"
+            ),
+            (Curved::Fitted, f) if f.is_meaning() => format!(
+                "{title}, with the curve undone that was fitted on the control scenes: what was done to these images is not what \
+                 was done to those"
+            ),
+            (_, Finding::Either(_)) if self.is_checked => format!(
+                "{title}; the image of the self-check shows something else: save both in the same way, and look what is done to \
+                 AO after it is traced"
+            ),
+            _ => finding.told(declared, Keys::Score),
+        }
     }
 
     /// How far an image of classic AO is from its converged image, by more than noise, where nothing explains it.
@@ -256,15 +348,24 @@ impl Reader<'_> {
         &self,
         image: &[f32],
         case: &CaseImages,
-        reference: &Reference,
+        looked: &Looked,
         own: &Diagnosis,
-        size: [usize; 2],
+        causes: Option<&[PairCause]>,
     ) -> Option<String> {
         let is_classic = self.references.suite().is_classic(&case.case.estimator);
-        if !is_classic || self.is_declared || !case.is_openness() || !own.findings.is_empty() {
+        let is_of_frame = case.shows() == Shows::Frame;
+        if !is_classic || self.is_declared || is_of_frame || !own.findings.is_empty() {
             return None;
         }
-        intake::agreement(image, reference, size, &[]).map(|apart| apart.to_string())
+        let apart = |found: &[Finding]| intake::agreement(image, &looked.reference, looked.size, found);
+        let disagreement = apart(&[]);
+        if case.shows() == Shows::Ratio {
+            return disagreement.map(|d| d.because(&of_pair(causes.unwrap_or_default()))).or_else(|| exposure(causes));
+        }
+        let disagreement = disagreement?;
+        // What is done to the other images of the method is done to this one, where it explains it.
+        let shared = looked.shared.as_ref().filter(|f| apart(std::slice::from_ref(*f)).is_none());
+        Some(shared.map_or_else(|| disagreement.to_string(), |f| self.sentence(f, &self.declared_of(case.shows()))))
     }
 
     /// Which other scene of the kit an image looks like, where it does not look like its own.
@@ -284,6 +385,23 @@ impl Reader<'_> {
             }
         }
         Ok(None)
+    }
+}
+
+/// What is said of frames of which nothing else is to be said, but that their exposure differs by little.
+pub(super) fn exposure(causes: Option<&[PairCause]>) -> Option<String> {
+    causes.filter(|c| matches!(c, [PairCause::Exposure(_)])).map(of_pair)
+}
+
+/// What makes the ratio of two frames differ from openness, or may do so.
+pub(super) fn of_pair(causes: &[PairCause]) -> String {
+    let told: Vec<String> = causes.iter().map(ToString::to_string).collect();
+    match told.len() {
+        0 => "what it is, the frames do not tell: exposure that differs between them, a tone curve, light that AO does not dim \
+              (direct or emitted), values cut off below white, strength of the AO, or R"
+            .to_owned(),
+        1 => told.concat(),
+        _ => format!("one of these, which the frames do not tell from each other: {}", told.join("; or: ")),
     }
 }
 

@@ -1,15 +1,17 @@
 //! One image by which a renderer shows that it draws the kit's scenes as they are meant.
 
 use super::{
-    ScoreError,
-    reading::{Reader, of_frame, shows},
+    ScoreError, lines,
+    reading::{Reader, exposure, of_frame, of_pair, shows},
+    together::Checked,
 };
 use crate::{
     disk::DiskError,
-    intake::{self, Curve, Handed, HandedImage, Reference, Scaled},
-    record::Shows,
+    intake::{self, Curve, Finding, Handed, HandedImage, Reference, Scaled},
+    record::{Shows, UndoneCurve},
     run::References,
 };
+use std::path::PathBuf;
 
 /// Its scene's name.
 pub const SCENE: &str = "self-check";
@@ -35,51 +37,79 @@ pub(super) fn read(references: &References) -> Result<(Reference, [u32; 2]), Dis
     Ok((Reference { openness, scaled: scaled.collect() }, layers.resolution))
 }
 
-/// Looks at the images of the self-check, with a curve undone that is declared. Returns what is doubtful.
+/// Looks at the images of the self-check, with a curve undone that is declared.
 ///
 /// # Errors
-/// [`ScoreError::SelfCheck`] where one is wrong, [`ScoreError::Disagrees`] where nobody knows why.
-pub(super) fn check(reader: &Reader<'_>, curve: Option<Curve>, handed: &[Handed]) -> Result<Vec<String>, ScoreError> {
+/// [`ScoreError::SelfCheck`] where one is wrong, [`ScoreError::Disagrees`] where nobody knows why. What else is to be said of
+/// the images stands on lines of its own.
+pub(super) fn check(reader: &Reader<'_>, curve: Option<Curve>, handed: &[Handed]) -> Result<Checked, ScoreError> {
+    let mut checked = Checked::default();
     if handed.is_empty() {
-        return Ok(vec![format!(
+        checked.doubts.push(format!(
             "There is no image of {SCENE}: whether images lie the right way round, are linear and take R in metres is known \
              as far as each scene tells."
-        )]);
+        ));
+        return Ok(checked);
     }
     let (reference, resolution) = read(reader.references)?;
     let size = resolution.map(|side| side as usize);
     let mut warnings = Vec::new();
+    let images = handed.iter().map(|h| h.images.len()).sum();
+    let told = |warnings: &[(PathBuf, String)]| -> Vec<String> {
+        reader.told(warnings, images).into_iter().map(|w| format!("{SCENE}: {w}")).collect()
+    };
     for (of, image) in handed.iter().flat_map(|h| h.images.iter().map(move |i| (&h.estimator, i))) {
-        let wrong = |why: String| ScoreError::SelfCheck(format!("{}: {why}", name_of(image)));
         let read = reader.image(image, of, resolution, &reference).map_err(|e| match e {
             ScoreError::Intake(e) => ScoreError::SelfCheck(e.to_string()),
             other => other,
         })?;
         warnings.extend(read.warnings);
-        let shows = shows(Some(image.shown));
-        for values in &read.images {
-            let plain = curve.filter(|_| shows != Shows::Frame).map(|curve| curve.undo(values));
-            let values = plain.as_ref().unwrap_or(values);
+        let (shows, causes) = (shows(Some(image.shown)), read.causes.as_deref());
+        for values in read.images {
+            let undone = curve.filter(|_| shows != Shows::Frame).map(|curve| curve.undo(&values));
+            let values = undone.unwrap_or(values);
             let found = match shows {
-                Shows::Frame => of_frame(values, &reference, None, size),
-                _ => reader.of_openness(values, &reference, size, shows),
+                Shows::Frame => of_frame(&values, &reference, None, size),
+                _ => reader.of_openness(&values, &reference, size, shows, causes),
             };
+            let why = |why: String| lines(format!("{}: {why}", name_of(image)), &told(&warnings));
             if !found.wrong.is_empty() {
-                return Err(wrong(found.wrong.join("; and: ")));
+                return Err(ScoreError::SelfCheck(why(found.wrong.join("; and: "))));
             }
             // What is expected is classic AO; a curve that is yet to be fitted is no disagreement.
-            if shows != Shows::Frame
-                && reader.references.suite().is_classic(of)
-                && !reader.is_declared
-                && let Some(apart) = intake::agreement(values, &reference, size, &found.findings)
-            {
-                return Err(ScoreError::Disagrees(format!("{}: {apart}", name_of(image))));
+            let is_expected = shows != Shows::Frame && reader.references.suite().is_classic(of) && !reader.is_declared;
+            if is_expected && let Some(apart) = intake::agreement(&values, &reference, size, &found.findings) {
+                let is_pair = shows == Shows::Ratio;
+                let apart =
+                    if is_pair { apart.because(&of_pair(causes.unwrap_or_default())) } else { apart.to_string() };
+                return Err(ScoreError::Disagrees(why(apart)));
             }
-            warnings.extend(found.doubtful.into_iter().map(|w| (image.path.clone(), w)));
+            checked.has_meaning |= found.findings.iter().any(Finding::is_meaning);
+            let little = exposure(causes).filter(|_| is_expected && found.findings.is_empty());
+            warnings.extend(found.doubtful.into_iter().chain(little).map(|w| (image.path.clone(), w)));
+            checked.images.push((values, shows));
         }
     }
-    let images = handed.iter().map(|h| h.images.len()).sum();
-    Ok(reader.told(&warnings, images).into_iter().map(|w| format!("{SCENE}: {w}")).collect())
+    checked.doubts = told(&warnings);
+    Ok(Checked { reference, width: size[0], ..checked })
+}
+
+/// What the images of the self-check show once the curve is undone that was fitted on the control scenes.
+pub(super) fn check_fitted(reader: &Reader<'_>, undone: &UndoneCurve, handed: &[Handed]) -> Option<String> {
+    if handed.is_empty() {
+        return None;
+    }
+    let UndoneCurve { gain, exponent, .. } = *undone;
+    let curve = Curve { gain, exponent, ..Curve::IDENTITY };
+    let undone = format!(
+        "the curve that was fitted on the control scenes, {gain:.2} times openness to the power {exponent:.2}, is undone in it, \
+         as in all images"
+    );
+    Some(match check(reader, Some(curve), handed) {
+        Ok(checked) if !checked.has_meaning => format!("{SCENE}: {undone}: it is as expected then"),
+        Ok(_) => format!("{SCENE}: {undone}: what is done to it is not what is done to those"),
+        Err(e) => format!("{SCENE}: {undone}, and then: {e}"),
+    })
 }
 
 fn name_of(image: &HandedImage) -> String {

@@ -15,6 +15,7 @@ use std::{
 mod frames;
 mod measured;
 mod self_check;
+mod told;
 mod wrong;
 
 const SUITE: &str = r#"

@@ -13,7 +13,7 @@ const STEPS: u32 = 12;
 /// Known factors must lie nearer to each other than so many times for one between them to be told.
 const APART: f64 = 2.1;
 /// What is left of the mean square difference with another R that is named.
-const NAMED: f64 = 0.25;
+pub(super) const NAMED: f64 = 0.25;
 
 /// By how much an image does not agree with its reference.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,8 +22,8 @@ pub struct Disagreement {
     pub rms: f64,
     /// Mean of the differences.
     pub mean: f64,
-    /// What brings the image near, if anything does.
-    pub cause: Option<Cause>,
+    /// What brings the image near: all that do about as well, the nearest first.
+    pub causes: Vec<Cause>,
 }
 
 /// What may make an image differ from its reference as a whole.
@@ -35,23 +35,30 @@ pub enum Cause {
     Gain(f64),
 }
 
+impl Disagreement {
+    /// By how much, and why, where that is known.
+    pub fn because(&self, why: &str) -> String {
+        let Disagreement { rms, mean, .. } = self;
+        format!(
+            "it does not agree with what is expected: mean difference {mean:+.4}, root mean square {rms:.4} over blocks of \
+             {BLOCK} x {BLOCK} pixels; {why}"
+        )
+    }
+}
+
 impl fmt::Display for Disagreement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Disagreement { rms, mean, cause } = self;
-        write!(
-            f,
-            "it does not agree with what is expected: mean difference {mean:+.4}, root mean square {rms:.4} over blocks of \
-             {BLOCK} x {BLOCK} pixels; "
-        )?;
-        match cause {
-            None => write!(f, "R or scale may be off"),
-            Some(Cause::Radius(factor)) => {
-                write!(f, "R or scale may be off: R looks like {factor:.2} times what was asked for")
+        let told = |cause: &Cause| match cause {
+            Cause::Radius(factor) => {
+                format!("R or scale may be off: R looks like {factor:.2} times what was asked for")
             }
-            Some(Cause::Gain(gain)) => {
-                write!(f, "exposure or intensity may be off: all looks like {gain:.2} times what is expected")
+            Cause::Gain(gain) => {
+                format!("exposure or intensity may be off: all looks like {gain:.2} times what is expected")
             }
-        }
+        };
+        let why: Vec<String> = self.causes.iter().map(told).collect();
+        let why = if why.is_empty() { "R or scale may be off".to_owned() } else { why.join("; or: ") };
+        f.write_str(&self.because(&why))
     }
 }
 
@@ -65,12 +72,15 @@ pub fn agreement(image: &[f32], reference: &Reference, size: [usize; 2], found: 
     let plain = found.iter().find_map(|f| undone(f, image));
     let [rms, mean] = differs(plain.as_deref().unwrap_or(image), &reference.openness, size[0])?;
     let without = left(image, &reference.openness, size[0])[0];
-    let other = radius(image, reference, size[0]).filter(Radius::is_told).map(|r| (Cause::Radius(r.factor), r.left[0]));
+    let other = radius(image, reference, size[0]).filter(Radius::is_told).map(|r| (Cause::Radius(r.factor), r.left));
     let gain = factor(image, &reference.openness);
     let plain: Vec<f32> = image.iter().map(|v| v / gain as f32).collect();
-    let gain = (Cause::Gain(gain), left(&plain, &reference.openness, size[0])[0]);
-    let nearest = other.into_iter().chain([gain]).min_by(|a, b| a.1.total_cmp(&b.1));
-    Some(Disagreement { rms, mean, cause: nearest.filter(|(_, left)| *left < NAMED * without).map(|(cause, _)| cause) })
+    let gain = (Cause::Gain(gain), left(&plain, &reference.openness, size[0]));
+    let mut named: Vec<_> = other.into_iter().chain([gain]).filter(|(_, left)| left[0] < NAMED * without).collect();
+    named.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
+    let best = named.first().map_or([f64::INFINITY; 2], |(_, left)| *left);
+    named.retain(|(_, left)| left[0] - best[0] < SURE * left[1].hypot(best[1]));
+    Some(Disagreement { rms, mean, causes: named.into_iter().map(|(cause, _)| cause).collect() })
 }
 
 /// Root mean square, without noise, and mean of the differences of blocks, where they are worth an explanation.

@@ -6,6 +6,7 @@ use super::{
     samples::{Samples, square},
 };
 use crate::{intake::Curve, layers::linear};
+use std::mem::discriminant;
 
 /// Root mean square, noise taken away, from which on a difference is looked into.
 pub(super) const DIFFERENT: f64 = 0.015;
@@ -27,6 +28,10 @@ pub(super) const SURE: f64 = 4.0;
 const DISPLAY: [f64; 2] = [1.0 / 2.7, 1.0 / 1.7];
 /// The reference must deviate by so much that a strength, one free number, can be told.
 const BLENDED: f64 = 0.05;
+/// What is added to openness is told from here on: methods that count the receiver's plane take away a tenth.
+const ADDED: f64 = 0.15;
+/// Powers go so far from 1 either way: farther, nearly all is black or white, as noise of one ray is.
+const POWERS: f64 = 4.0;
 /// Strengths of AO that are looked for.
 const STRENGTHS: std::ops::Range<f64> = 0.05..4.0;
 
@@ -37,36 +42,109 @@ struct Hypothesis {
     left: [f64; 2],
 }
 
+/// An image, and what it is held against.
+#[derive(Clone, Copy, Debug)]
+pub struct Held<'a> {
+    /// Openness as it was read, a value a pixel of the view.
+    pub image: &'a [f32],
+    /// What it should be, as [`Reference::openness`].
+    pub reference: &'a [f32],
+    /// Width of the view.
+    pub width: usize,
+}
+
+/// What the numbers of images mean that one renderer made in the same way, so that one finding must explain all of
+/// them: an encoding, a strength, a curve or an offset, or [`Finding::Either`] of several. None where they are as they
+/// should be, or where nothing explains them all.
+pub fn meaning_of(held: &[Held<'_>]) -> Option<Finding> {
+    let without = left_of(held, &|image| image.to_vec());
+    if !is_different(without) {
+        return None;
+    }
+    let explained = explanations(held, without);
+    let best = nearest(&explained)?;
+    Some(either(&explained, &best, without))
+}
+
+/// Puts what images have in common, by [`meaning_of`], in the place of what each was taken for, where that is among it.
+pub fn agree(findings: &mut [Vec<Finding>], shared: &Finding) {
+    let kinds = |finding: &Finding| match finding {
+        Finding::Either(all) => all.iter().map(discriminant).collect(),
+        one => vec![discriminant(one)],
+    };
+    let of_all = kinds(shared);
+    for found in findings.iter_mut().flatten().filter(|f| f.is_meaning()) {
+        if kinds(found).iter().any(|kind| of_all.contains(kind)) {
+            *found = shared.clone();
+        }
+    }
+}
+
 /// What explains how an image differs from the reference, if anything does.
 pub(super) fn find(image: &[f32], reference: &Reference, width: usize) -> Option<Finding> {
+    let held = [Held { image, reference: &reference.openness, width }];
     let without = left(image, &reference.openness, width);
     if !is_different(without) {
         return None;
     }
-    let hypotheses = values(image, reference, width).into_iter().chain(scales(image, reference, width));
-    let blended = strength(image, reference, width).filter(|h| explains(h.left, without));
-    let hypotheses = hypotheses.chain(gain(image, reference, width));
-    let hypotheses = hypotheses.filter(|h| explains(h.left, without)).chain(blended.clone());
-    let best = hypotheses.reduce(|a, b| if b.left[0] < a.left[0] { b } else { a })?;
-    // One free number that does nearly as well as two is rather it.
-    if let (Finding::Curve { .. }, Some(blended)) = (&best.finding, &blended)
-        && blended.left[0] - best.left[0] < 2.0 * blended.left[1].hypot(best.left[1])
-    {
-        return Some(blended.finding.clone());
-    }
+    let explained = explanations(&held, without);
+    let scaled: Vec<Hypothesis> = scales(image, reference, width).filter(|h| explains(h.left, without)).collect();
+    let best = nearest(&[explained.as_slice(), &scaled].concat())?;
     Some(match best.finding {
         Finding::Scaled { factors } => nearer_scale(image, reference, width, best.left)
             .unwrap_or_else(|| same_scales(image, reference, width, &factors)),
-        Finding::Encoded { gamma, .. } => {
-            let alike = |h: &Hypothesis| h.left[0] - best.left[0] < SURE * h.left[1].hypot(best.left[1]);
-            let strength = blended.filter(alike).and_then(|h| match h.finding {
-                Finding::Strength { strength } => Some(strength),
-                _ => None,
-            });
-            Finding::Encoded { gamma, strength }
-        }
-        other => other,
+        _ => either(&explained, &best, without),
     })
+}
+
+/// The hypothesis that leaves least. One free number that does nearly as well as two is rather it.
+fn nearest(all: &[Hypothesis]) -> Option<Hypothesis> {
+    let least = |of: &mut dyn Iterator<Item = &Hypothesis>| {
+        of.reduce(|a, b| if b.left[0] < a.left[0] { b } else { a }).cloned()
+    };
+    let best = least(&mut all.iter())?;
+    if !has_two_numbers(&best.finding) {
+        return Some(best);
+    }
+    let one = least(&mut all.iter().filter(|h| !has_two_numbers(&h.finding)));
+    one.filter(|h| h.left[0] - best.left[0] < 2.0 * h.left[1].hypot(best.left[1])).or(Some(best))
+}
+
+fn has_two_numbers(finding: &Finding) -> bool {
+    matches!(finding, Finding::Curve { gain, exponent } if *gain != 1.0 && *exponent != 1.0)
+}
+
+/// The best of several explanations with all that fit about as well, the best first. Those do which leave no more
+/// than the noise beyond what the best leaves, or so little that an image without any finding may differ by it.
+fn either(explained: &[Hypothesis], best: &Hypothesis, without: [f64; 2]) -> Finding {
+    let fits = |h: &&Hypothesis| {
+        let beyond = h.left[0] - best.left[0];
+        let is_as_near = beyond < SURE * h.left[1].hypot(best.left[1]) || !is_different(h.left);
+        let is_other = h.finding != best.finding && !has_two_numbers(&h.finding);
+        is_other && is_as_near && explains_some(h.left, without)
+    };
+    // A curve of two numbers comes near to all the others.
+    let mut others: Vec<&Hypothesis> =
+        explained.iter().filter(|_| !has_two_numbers(&best.finding)).filter(fits).collect();
+    others.sort_by(|a, b| a.left[0].total_cmp(&b.left[0]));
+    let mut all = vec![best];
+    for other in others {
+        if !all.iter().any(|h| is_same_kind(h, other)) {
+            all.push(other);
+        }
+    }
+    let all: Vec<Finding> = all.into_iter().map(|h| h.finding.clone()).collect();
+    if all.len() == 1 { best.finding.clone() } else { Finding::Either(all) }
+}
+
+/// The sRGB curve and a power are told from each other where they are made.
+fn is_same_kind(a: &Hypothesis, b: &Hypothesis) -> bool {
+    a.finding.is_encoded() && b.finding.is_encoded()
+}
+
+/// Whether a hypothesis explains enough of a difference to be named beside one that explains it.
+fn explains_some(left: [f64; 2], without: [f64; 2]) -> bool {
+    left[0] + 2.0 * left[1] < CERTAIN * without[0]
 }
 
 /// Whether what a hypothesis leaves of a difference explains it: mean squares with their errors.
@@ -87,46 +165,44 @@ pub(super) fn is_rather(image: &[f32], reference: &[f32], other: &[f32], width: 
     is_different(without) && explains(left(image, other, width), without)
 }
 
-/// AO that was blended with white: a factor on occlusion.
-fn strength(image: &[f32], reference: &Reference, width: usize) -> Option<Hypothesis> {
-    let strength = proportion(image, &reference.openness, |v| 1.0 - v);
-    by_one_number(image, reference, width, strength, Finding::Strength { strength })
-}
-
-/// A factor on openness: it needs less variety to be told than a curve does.
-fn gain(image: &[f32], reference: &Reference, width: usize) -> Option<Hypothesis> {
-    let gain = factor(image, &reference.openness);
-    by_one_number(image, reference, width, gain, Finding::Curve { gain, exponent: 1.0 })
-}
-
 /// The factor on all values of the reference that an image is nearest to, by least squares.
 pub(super) fn factor(image: &[f32], reference: &[f32]) -> f64 {
-    proportion(image, reference, |v| v)
+    proportion(std::iter::once((image, reference)), |v| v)
 }
 
-/// The factor between what `of` makes of reference and image, by least squares.
-fn proportion(image: &[f32], reference: &[f32], of: fn(f64) -> f64) -> f64 {
-    let pairs = image.iter().zip(reference).map(|(a, b)| [*a, *b].map(|v| of(f64::from(v))));
+/// The factor between what `of` makes of references and images, by least squares.
+pub(super) fn proportion<'a>(pairs: impl Iterator<Item = (&'a [f32], &'a [f32])>, of: fn(f64) -> f64) -> f64 {
+    let pairs = pairs.flat_map(|(image, reference)| image.iter().zip(reference));
+    let pairs = pairs.map(|(a, b)| [*a, *b].map(|v| of(f64::from(v))));
     let known = pairs.filter(|p| p.iter().all(|v| v.is_finite()));
     let (both, own) = known.fold((0.0, 0.0), |(both, own), [a, b]| (both + a * b, own + b * b));
     both / own
 }
 
-/// What a finding of one free number leaves, where scene and number are such that it can be told.
-fn by_one_number(
-    image: &[f32],
-    reference: &Reference,
-    width: usize,
-    number: f64,
-    finding: Finding,
-) -> Option<Hypothesis> {
-    let reference = &reference.openness;
-    let is_even = Samples::new(image, reference).deviation() < BLENDED;
-    if is_even || !STRENGTHS.contains(&number) || number.max(1.0 / number) < GAINED {
-        return None;
+/// What one free number may have made of openness, where it is such that it can be told: AO that was blended with white, a
+/// factor on openness, a power of it, and something added to it. They need less variety than a curve of two numbers does.
+fn by_one_number(held: &[Held<'_>]) -> Vec<Finding> {
+    let pairs = || held.iter().map(|h| (h.image, h.reference));
+    let is_telling = |number: f64| STRENGTHS.contains(&number) && number.max(1.0 / number) >= GAINED;
+    let mut found = Vec::new();
+    let strength = proportion(pairs(), |v| 1.0 - v);
+    found.extend(is_telling(strength).then_some(Finding::Strength { strength }));
+    let gain = proportion(pairs(), |v| v);
+    found.extend(is_telling(gain).then_some(Finding::Curve { gain, exponent: 1.0 }));
+    if let Some(exponent) = Curve::power(&pairs().collect::<Vec<_>>())
+        && (CURVED..POWERS).contains(&exponent.max(1.0 / exponent))
+    {
+        found.push(of_power(1.0, exponent));
     }
-    let left = left(&undone(&finding, image)?, reference, width);
-    Some(Hypothesis { finding, left })
+    let by = Samples::of(pairs().flat_map(|(a, b)| a.iter().copied().zip(b.iter().copied()))).offset();
+    found.extend((by.abs() >= ADDED).then_some(Finding::Offset { by }));
+    found
+}
+
+/// A curve, or the encoding for display that its exponent speaks for.
+fn of_power(gain: f64, exponent: f64) -> Finding {
+    let is_display = (DISPLAY[0]..DISPLAY[1]).contains(&exponent) && (0.95..1.05).contains(&gain);
+    if is_display { Finding::Encoded { gamma: Some(1.0 / exponent) } } else { Finding::Curve { gain, exponent } }
 }
 
 /// The image as it would be without what was found.
@@ -138,6 +214,8 @@ pub(super) fn undone(finding: &Finding, image: &[f32]) -> Option<Vec<f32>> {
         Finding::Strength { strength } => {
             return Some(image.iter().map(|v| 1.0 - (1.0 - v) / strength as f32).collect());
         }
+        Finding::Offset { by } => return Some(image.iter().map(|v| v - by as f32).collect()),
+        Finding::Either(ref all) => return undone(all.first()?, image),
         _ => return None,
     };
     Some(curve.undo(image))
@@ -148,34 +226,51 @@ pub(super) fn left(image: &[f32], reference: &[f32], width: usize) -> [f64; 2] {
     square(&image.iter().zip(reference).map(|(a, b)| a - b).collect::<Vec<_>>(), width)
 }
 
-/// The image as codes, and through a curve. Codes come first: they have no free number.
-fn values(image: &[f32], reference: &Reference, width: usize) -> Vec<Hypothesis> {
-    let left_by = |finding: &Finding| undone(finding, image).map(|u| left(&u, &reference.openness, width));
-    let srgb = Finding::Encoded { gamma: None, strength: None };
-    let mut found = Vec::new();
-    if let Some(left) = left_by(&srgb) {
-        found.push(Hypothesis { finding: srgb, left });
-    }
-    if Samples::new(image, &reference.openness).deviation() < VARIED {
-        return found;
-    }
-    let Some(curve) = Curve::fit(&[(image, reference.openness.as_slice())]) else { return found };
-    let (gain, exponent) = (curve.gain, curve.exponent);
-    let apart = |v: f64| v.max(1.0 / v);
-    if apart(exponent) < CURVED && apart(gain) < GAINED {
-        return found;
-    }
-    let is_display = (DISPLAY[0]..DISPLAY[1]).contains(&exponent) && (0.95..1.05).contains(&gain);
-    let finding = if is_display {
-        Finding::Encoded { gamma: Some(1.0 / exponent), strength: None }
-    } else {
-        Finding::Curve { gain, exponent }
+/// The same over several images, as pixels, with `undo` applied to each.
+fn left_of(held: &[Held<'_>], undo: &dyn Fn(&[f32]) -> Vec<f32>) -> [f64; 2] {
+    let each = held.iter().map(|h| (h.image.len() as f64, left(&undo(h.image), h.reference, h.width)));
+    let known = each.filter(|(_, [_, error])| error.is_finite());
+    let (n, sum, squares) = known.fold((0.0, 0.0, 0.0), |(n, sum, squares), (pixels, [left, error])| {
+        (n + pixels, sum + pixels * left, squares + (pixels * error).powi(2))
+    });
+    if n > 0.0 { [sum / n, f64::sqrt(squares) / n] } else { [0.0, f64::INFINITY] }
+}
+
+/// The images as codes, by one free number, and through a curve: what explains how they differ. Codes come first, as
+/// they have no free number.
+fn explanations(held: &[Held<'_>], without: [f64; 2]) -> Vec<Hypothesis> {
+    let hypothesis = |finding: Finding| {
+        let left = left_of(held, &|image| undone(&finding, image).unwrap_or_else(|| image.to_vec()));
+        Hypothesis { finding, left }
     };
-    let Some(left) = left_by(&finding) else { return found };
-    // What the sRGB curve explains nearly as well is that.
-    let is_srgb = is_display && found.iter().any(|h| h.left[0] < 2.0 * left[0] + 1e-5 + SURE * left[1]);
-    if !is_srgb {
-        found.push(Hypothesis { finding, left });
+    let of = |h: &Held<'_>| h.image.iter().copied().zip(h.reference.iter().copied()).collect::<Vec<_>>();
+    let deviation = Samples::of(held.iter().flat_map(of)).deviation();
+    let mut found = vec![hypothesis(Finding::Encoded { gamma: None })];
+    if deviation >= BLENDED {
+        found.extend(by_one_number(held).into_iter().map(hypothesis));
+    }
+    let pairs: Vec<(&[f32], &[f32])> = held.iter().map(|h| (h.image, h.reference)).collect();
+    if deviation >= VARIED
+        && let Some(Curve { gain, exponent, .. }) = Curve::fit(&pairs)
+        && (exponent.max(1.0 / exponent) >= CURVED || gain.max(1.0 / gain) >= GAINED)
+    {
+        found.push(hypothesis(of_power(gain, exponent)));
+    }
+    // What the sRGB curve explains nearly as well as a power is that.
+    let codes = found[0].left[0];
+    let is_codes = |h: &Hypothesis| {
+        let is_power = matches!(h.finding, Finding::Encoded { gamma: Some(_) });
+        is_power && codes < 2.0 * h.left[0] + 1e-5 + SURE * h.left[1]
+    };
+    found.retain(|h| explains(h.left, without) && !is_codes(h));
+    // Noise of few rays makes a power of another method where openness hardly varies: it is named beside others alone.
+    let is_power = |h: &Hypothesis| match h.finding {
+        Finding::Curve { exponent, .. } => exponent != 1.0,
+        Finding::Encoded { gamma } => gamma.is_some(),
+        _ => false,
+    };
+    if deviation < VARIED && found.iter().all(is_power) {
+        found.clear();
     }
     found
 }

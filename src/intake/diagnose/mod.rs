@@ -7,6 +7,7 @@
 
 mod agreement;
 mod meaning;
+mod pair;
 mod place;
 mod range;
 mod samples;
@@ -15,6 +16,8 @@ mod shift;
 mod tests;
 
 pub use agreement::{Cause, Disagreement, agreement};
+pub use meaning::{Held, agree, meaning_of};
+pub use pair::{Pair, PairCause, pair_causes};
 pub use place::{Turn, alike};
 
 use crate::metrics::regions::{Region, Regions};
@@ -86,7 +89,7 @@ pub enum Finding {
         most: f32,
         /// What they must be divided by; None where no usual scale explains them.
         scale: Option<f64>,
-        /// Pixels that are farther out of range than openness gets.
+        /// Pixels that are more than 1 out of range, on either side.
         count: usize,
         /// Column and row of the farthest.
         farthest: [usize; 2],
@@ -115,8 +118,6 @@ pub enum Finding {
     Encoded {
         /// None: the sRGB curve.
         gamma: Option<f64>,
-        /// What [`Finding::Strength`] would explain it as well, where the scene cannot tell them apart.
-        strength: Option<f64>,
     },
     /// Its numbers were linear before they were decoded as the sRGB codes that they were declared to be, by
     /// [`super::examine`].
@@ -133,6 +134,13 @@ pub enum Finding {
         /// Exponent.
         exponent: f64,
     },
+    /// The same was added to openness everywhere.
+    Offset {
+        /// Below 0 it was taken away.
+        by: f64,
+    },
+    /// One of several, which the images cannot tell from each other; two or more, the nearest first.
+    Either(Vec<Finding>),
     /// R is not what was asked for. Several factors where the scene looks the same with each.
     Scaled {
         /// Times R.
@@ -192,7 +200,7 @@ pub fn diagnose(image: &[f32], reference: &Reference, size: [usize; 2]) -> Vec<F
         findings.push(shifted.unwrap_or(Finding::Unlike { correlation: placed.correlation }));
         return findings;
     }
-    findings.extend((placed.turn != Turn::None).then_some(Finding::Turned(placed.turn)));
+    findings.extend(turned(&placed));
     findings.extend(placed.inverted.then_some(Finding::Inverted));
     let upright = placed.undone(&image, size);
     let meaning = meaning::find(&upright, reference, size[0]);
@@ -211,6 +219,16 @@ pub fn diagnose(image: &[f32], reference: &Reference, size: [usize; 2]) -> Vec<F
     let far = || if is_explained { None } else { shift::far(&plain, like, size) };
     findings.extend(shifted.or_else(far).map(|pixels| Finding::Shifted { pixels }));
     findings
+}
+
+/// How an image lies, where it lies otherwise than it should.
+fn turned(placed: &place::Placed) -> Option<Finding> {
+    let all: Vec<Finding> = [&[placed.turn], placed.or.as_slice()].concat().into_iter().map(Finding::Turned).collect();
+    match placed.turn {
+        Turn::None => None,
+        turn if placed.or.is_empty() => Some(Finding::Turned(turn)),
+        _ => Some(Finding::Either(all)),
+    }
 }
 
 /// Whether an image that is not like its reference is like `other`, that of another scene: the
@@ -277,9 +295,12 @@ impl Finding {
             Finding::Range { least, most, scale, count, farthest: [x, y] } => {
                 let at = match scale {
                     Some(_) => String::new(),
-                    None => format!("; {count} pixels are far beyond, the farthest at column {x}, row {y}"),
+                    None => {
+                        format!("; {count} pixels are more than 1 beyond that, the farthest at column {x}, row {y}")
+                    }
                 };
-                format!("out of range: values run from {least:.3} to {most:.3}, where openness is 0 to 1{at}")
+                let [least, most] = [*least, *most].map(number);
+                format!("out of range: values run from {least} to {most}, where openness is 0 to 1{at}")
             }
             Finding::Negative { count, least, is_signed, .. } => {
                 let signed = if *is_signed { ", as if it ran from -1 to 1" } else { "" };
@@ -289,13 +310,15 @@ impl Finding {
             Finding::Constant { value } => format!("constant: {value} everywhere"),
             Finding::Turned(turn) => turn.title().to_owned(),
             Finding::Inverted => "inverted: 1 is closed".to_owned(),
-            Finding::Encoded { gamma, strength } => {
+            Finding::Encoded { gamma } => {
                 let how =
                     gamma.map_or("sRGB codes, not linear".to_owned(), |g| format!("openness to the power 1/{g:.1}"));
-                let or = strength.map_or(String::new(), |s| {
-                    format!(" (or AO of strength {s:.2}, which this scene cannot tell from it)")
-                });
-                format!("gamma-encoded: {how}{or}")
+                format!("gamma-encoded: {how}")
+            }
+            Finding::Offset { by } => format!("an offset: {by:+.2} on openness everywhere"),
+            Finding::Either(all) => {
+                let titles: Vec<String> = all.iter().map(Finding::title).collect();
+                format!("{}; which of them, these images cannot tell", titles.join(", or "))
             }
             Finding::Decoded => "decoded twice: declared as sRGB codes, but its numbers are linear".to_owned(),
             Finding::Strength { strength } => {
@@ -321,8 +344,27 @@ impl Finding {
     /// Whether the image may be measured all the same, since it may be meant to be so.
     pub fn is_doubt(&self) -> bool {
         match self {
-            Finding::Curve { .. } | Finding::Strength { .. } | Finding::Shifted { .. } => true,
+            Finding::Curve { .. } | Finding::Strength { .. } | Finding::Offset { .. } | Finding::Shifted { .. } => true,
+            Finding::Either(all) => all.first().is_some_and(Finding::is_doubt),
             Finding::Negative { is_doubt, .. } => *is_doubt,
+            _ => false,
+        }
+    }
+
+    /// Whether it is codes for display, or these first of all.
+    pub fn is_encoded(&self) -> bool {
+        match self {
+            Finding::Encoded { .. } => true,
+            Finding::Either(all) => all.first().is_some_and(Finding::is_encoded),
+            _ => false,
+        }
+    }
+
+    /// Whether it says what numbers stand for, and not where pixels lie or which are missing.
+    pub fn is_meaning(&self) -> bool {
+        match self {
+            Finding::Encoded { .. } | Finding::Strength { .. } | Finding::Curve { .. } | Finding::Offset { .. } => true,
+            Finding::Either(all) => all.iter().all(Finding::is_meaning),
             _ => false,
         }
     }
@@ -352,10 +394,12 @@ impl Finding {
             Finding::Strength { .. } => {
                 "set strength, intensity or opacity of the AO to 1, or save its buffer before it is blended".to_owned()
             }
-            Finding::Encoded { gamma: None, .. } => {
+            Finding::Offset { .. } => "save openness as it is, with nothing added to it or taken from it".to_owned(),
+            Finding::Either(_) => "hand in the image of the self-check, which can".to_owned(),
+            Finding::Encoded { gamma: None } => {
                 "declare `encoding = \"srgb\"`, or save the buffer without a view transform".to_owned()
             }
-            Finding::Encoded { gamma: Some(gamma), .. } => format!(
+            Finding::Encoded { gamma: Some(gamma) } => format!(
                 "save the buffer without a view transform, or declare `curve = {{ gain = 1.0, exponent = {:.3} }}`",
                 1.0 / gamma
             ),
@@ -390,6 +434,11 @@ impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}; {}", self.title(), self.remedy())
     }
+}
+
+/// A value as people read it: of many digits with a power of ten.
+pub(super) fn number(v: f32) -> String {
+    if v.abs() < 1e6 { format!("{v:.3}") } else { format!("{v:.2e}") }
 }
 
 /// A factor as people write it: below 1 as a fraction.

@@ -34,6 +34,8 @@ const TIMES: f64 = 1.15;
 /// An image whose correlation with the reference is below this, its noise taken away, is no
 /// picture of the scene.
 pub(super) const LEAST: f64 = 0.5;
+/// Two turns of a scene are the same that share so much of the variance: noise of the reference leaves less.
+const SAME: f64 = 0.97;
 /// A reference must vary so much before likeness is asked for.
 const CONTRAST: f64 = 0.03;
 /// Standard errors of a correlation that tell its sign.
@@ -42,6 +44,8 @@ const SURE: f64 = 5.0;
 /// How an image lies, by its best hypothesis.
 pub(super) struct Placed {
     pub turn: Turn,
+    /// Other turns that the scene cannot tell from it.
+    pub or: Vec<Turn>,
     pub inverted: bool,
     /// With the best of all references, without the image's noise; 1 where it cannot be told.
     pub correlation: f64,
@@ -146,7 +150,8 @@ pub(super) fn find(image: &[f32], reference: &Reference, size: [usize; 2]) -> Pl
     let references = || std::iter::once(&reference.openness).chain(reference.scaled.iter().map(|s| &s.openness));
     let own = Samples::new(image, &reference.openness);
     if own.deviation() < VARIED {
-        return Placed { turn: Turn::None, inverted: is_inverted_level(image, reference), correlation: 1.0 };
+        let inverted = is_inverted_level(image, reference);
+        return Placed { turn: Turn::None, or: Vec::new(), inverted, correlation: 1.0 };
     }
     // Explained share of variance, the sign of the correlation, and which reference it was.
     let best = |turn: Turn| {
@@ -162,11 +167,23 @@ pub(super) fn find(image: &[f32], reference: &Reference, size: [usize; 2]) -> Pl
         let better = share(&b.1) > share(&a.1) + least && share(&b.1) > share(&a.1) * times;
         if better { b } else { a }
     }) else {
-        return Placed { turn: Turn::None, inverted: false, correlation: 1.0 };
+        return Placed { turn: Turn::None, or: Vec::new(), inverted: false, correlation: 1.0 };
     };
     let sure = samples.correlation().abs() * (samples.pairs() as f64).sqrt() > SURE;
     let inverted = sure && samples.correlation() < 0.0;
-    Placed { turn, inverted, correlation: likeness(image, &samples, own.mean(), size[0]) }
+    let or = same_as(turn, &reference.openness, size);
+    Placed { turn, or, inverted, correlation: likeness(image, &samples, own.mean(), size[0]) }
+}
+
+/// Turns after which the scene looks as it does after another one, which is no lying as it should.
+fn same_as(turn: Turn, openness: &[f32], size: [usize; 2]) -> Vec<Turn> {
+    if turn == Turn::None {
+        return Vec::new();
+    }
+    let turned = turn.of(openness, size);
+    let is_same =
+        |other: &Turn| Samples::new(&other.of(openness, size), &turned).correlation().max(0.0).powi(2) >= SAME;
+    Turn::possible(size)[1..].iter().copied().filter(|t| *t != turn && is_same(t)).collect()
 }
 
 /// The share of its variance that a frame which lies otherwise must have explained by a picture of

@@ -2,8 +2,10 @@
 
 use super::{Finding, meaning::left};
 
-/// Openness above this is of another scale, or of no openness at all.
+/// Openness above this is of another scale, or of no openness at all...
 const TOP: f32 = 2.0;
+/// ... and below this, as far out of range, where so few are there that no scale and no curve has brought them.
+const BOTTOM: f32 = -1.0;
 /// The highest codes that integers have, and percent.
 const SCALES: [f64; 5] = [100.0, 255.0, 1023.0, 4095.0, 65_535.0];
 /// What is left of the mean square of the reference at the right scale: less than half. At a wrong
@@ -27,12 +29,13 @@ pub(super) fn find(image: &[f32], reference: &[f32], width: usize) -> Option<(Fi
     let low = seen().filter(|v| *v < -TOP).count() as f64;
     let closed = least < -1.0 - TOP && most <= TOP && low > FEW * all;
     let at = |scale: f64, v: f32| if closed { 1.0 - (1.0 - v) / scale as f32 } else { v / scale as f32 };
-    if most > TOP || least < -1.0 - TOP {
+    let is_outlier = least < BOTTOM && seen().filter(|v| *v < BOTTOM).count() as f64 <= FEW * all;
+    if most > TOP || least < -1.0 - TOP || is_outlier {
         let (count, farthest) = beyond(image, reference, width);
         let [least, most] = if closed { [1.0 - most, 1.0 - least] } else { [least, most] };
         let scale = scale(image, reference, width, f64::from(most), &at);
         // What else is wrong is told by the other pixels.
-        let is_kept = |v: f32| scale.is_some() || (-TOP..=TOP).contains(&v);
+        let is_kept = |v: f32| scale.is_some() || (BOTTOM..=TOP).contains(&v);
         let undone = |v: &f32| if is_kept(*v) { at(scale.unwrap_or(1.0), *v) } else { f32::NAN };
         let undone = image.iter().map(undone).collect();
         return Some((Finding::Range { least, most, scale, count, farthest }, undone));
@@ -52,7 +55,8 @@ pub(super) fn find(image: &[f32], reference: &[f32], width: usize) -> Option<(Fi
 /// How many pixels that see a surface are beyond what openness gets to, and where the farthest is.
 fn beyond(image: &[f32], reference: &[f32], width: usize) -> (usize, [usize; 2]) {
     let seen = image.iter().zip(reference).enumerate().filter(|(_, (v, r))| v.is_finite() && r.is_finite());
-    let beyond = seen.map(|(i, (v, _))| (i, v.abs())).filter(|(_, far)| *far > TOP);
+    let far = |v: f32| if v < 0.0 { -v } else { v - 1.0 };
+    let beyond = seen.map(|(i, (v, _))| (i, far(*v))).filter(|(_, far)| *far > TOP - 1.0);
     let (count, at, _) = beyond.fold(
         (0, 0, 0.0),
         |(n, at, most), (i, far)| {

@@ -68,6 +68,11 @@ impl Samples {
         self.means[1]
     }
 
+    /// What is added to the reference on average.
+    pub(super) fn offset(&self) -> f64 {
+        self.means[0] - self.means[1]
+    }
+
     /// Mean of the image.
     pub(super) fn mean(&self) -> f64 {
         self.means[0]
