@@ -77,6 +77,11 @@ pub fn is_part(name: &str) -> bool {
     name.starts_with(PART[0]) && name.ends_with(PART[1])
 }
 
+/// Whether it is a file that calls itself a zip archive, as CI systems hand out artifacts.
+pub(crate) fn is_zip(path: &Path) -> bool {
+    path.extension().is_some_and(|end| end.eq_ignore_ascii_case("zip")) && path.is_file()
+}
+
 /// Writes a value as JSON, indented, by [`write_whole`]; `what` it is, in errors.
 ///
 /// # Errors

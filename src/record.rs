@@ -20,7 +20,7 @@ pub use source::{HandedIn, Intervals, Shows, Source, UndoneCurve, told_once};
 pub use until_sure::{Budget, Undecided, UntilSure};
 
 use crate::{
-    disk::{DiskError, read_text},
+    disk::{DiskError, is_zip, read_text},
     gate::{Gate, Outcome, Verdict},
     metrics::{Metric, artifact::Brighter, convergence::Convergence, profile::Curve, regions::Region},
     pooled::Pooled,
@@ -206,6 +206,11 @@ impl Summary {
             failed_judges: scenes.iter().filter(|s| s.judge_error.is_some()).count(),
         }
     }
+}
+
+/// So many of a thing: `1 case`, `2 cases`.
+pub(crate) fn counted(n: usize, thing: &str) -> String {
+    format!("{n} {thing}{}", if n == 1 { "" } else { "s" })
 }
 
 /// A gate that nothing was held against.
@@ -458,7 +463,7 @@ pub struct Timing {
 }
 
 impl Record {
-    /// Reads a record folder.
+    /// Reads a record folder. Its summary is counted anew.
     ///
     /// # Errors
     /// Where `record.json` is missing (the run did not finish), malformed, or of
@@ -468,6 +473,8 @@ impl Record {
         if !path.exists() {
             let why = if folder.join(SHARD).exists() {
                 "it is a shard: merge it with the others first"
+            } else if is_zip(folder) {
+                return Err(DiskError::content(folder, "this is a zip archive: unpack it first, and name the folder"));
             } else if folder.join(BEGUN).exists() {
                 "the run that wrote it did not finish"
             } else {
@@ -478,7 +485,9 @@ impl Record {
         let text = read_text(&path)?;
         let record = version::parse(&text).map_err(|e| DiskError::content(&path, e))?;
         record.check_names().map_err(|e| DiskError::content(&path, e))?;
-        Ok(record)
+        // It may have been edited: what it holds counts, not what it says of itself.
+        let summary = Summary::new(&record.verdicts, &record.idle_gates, &record.scenes, &record.cases);
+        Ok(Record { summary, ..record })
     }
 
     /// Names become file names and image paths are followed, so neither may lead
@@ -551,19 +560,19 @@ impl Record {
         let s = &self.summary;
         let mut line = format!("{} passed, {} failed, {} inconclusive", s.pass, s.fail, s.inconclusive);
         if s.known_failures > 0 {
-            line += &format!(", {} known failures", s.known_failures);
+            line += &format!(", {}", counted(s.known_failures, "known failure"));
         }
         if s.warnings > 0 {
-            line += &format!(", {} warnings", s.warnings);
+            line += &format!(", {}", counted(s.warnings, "warning"));
         }
         if s.not_run > 0 {
             line += &format!(", {} not run", s.not_run);
         }
         if s.failed_cases > 0 {
-            line += &format!("; {} of {} cases ended with an error", s.failed_cases, s.cases);
+            line += &format!("; {} of {} ended with an error", s.failed_cases, counted(s.cases, "case"));
         }
         if s.failed_judges > 0 {
-            line += &format!("; the judge of {} scenes failed", s.failed_judges);
+            line += &format!("; the judge of {} failed", counted(s.failed_judges, "scene"));
         }
         line
     }

@@ -61,9 +61,9 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     if matches!(args.ci, Ci::Gitlab) {
         tell(&format!("to use it, add to .gitlab-ci.yml: include: [{{ local: {} }}]", GITLAB.0));
     }
-    if !matches!(args.ci, Ci::None) {
-        tell("its records are no sources: add aogauge-record/, aogauge-base/ and aogauge-comment.md to .gitignore");
-    }
+    let of_ci =
+        if matches!(args.ci, Ci::None) { "" } else { ", aogauge-record/, aogauge-base/ and aogauge-comment.md" };
+    tell(&format!("records are no sources: add reports/{of_ci} to .gitignore"));
     tell(&format!("try it: aogauge run {}", args.dir.join(SUITE.0).display()));
     Ok(Exit::Pass)
 }

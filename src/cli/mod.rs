@@ -38,7 +38,7 @@ pub enum Exit {
     Failed = 1,
     /// Wrong usage or configuration.
     Usage = 2,
-    /// A golden is missing or unreadable.
+    /// A golden is missing or unusable.
     Golden = 3,
     /// Nothing was selected.
     Nothing = 4,
@@ -66,7 +66,7 @@ impl Exit {
 #[command(name = "aogauge", version, about, max_term_width = 100)]
 #[command(
     after_help = "Examples:\n  aogauge run\n  aogauge run --out reports/mine --seed 7\n  aogauge golden verify reports/mine\n\n\
-Exit codes: 0 pass, 1 gate failed, 2 usage or configuration, 3 golden missing or unreadable,\n\
+Exit codes: 0 pass, 1 gate failed, 2 usage or configuration, 3 golden missing or unusable,\n\
 4 nothing selected, 5 run incomplete, 6 inconclusive."
 )]
 pub struct Cli {

@@ -22,8 +22,8 @@ use std::{
 aogauge report reports/latest --format markdown,html,junit\n  \
 aogauge report reports/latest --format github --image-base https://example.org/reports/42 --gate\n  \
 aogauge report reports/latest --format json | jq -r '.failures[].subject'\n\n\
-Exit codes: 0 the reports are made, 2 they cannot be. With --gate, where they are made, as the run's:\n\
-0 pass, 1 a gate failed, 5 incomplete, 6 inconclusive. docs/reports.md tells more.")]
+Exit codes: 0 the reports are made, 2 they cannot be. With --gate, where they are made, as the run's: 0 pass,\n\
+1 a gate failed, 4 no gate was held against anything, 5 incomplete, 6 inconclusive. docs/reports.md tells more.")]
 pub struct Args {
     /// The record's folder.
     record: PathBuf,

@@ -8,6 +8,7 @@ mod difference;
 mod exact;
 mod folders;
 mod limits;
+mod outputs;
 mod pair;
 mod pictures;
 mod region;
@@ -19,13 +20,14 @@ pub use difference::Difference;
 pub use exact::{Exact, exact, exact_images};
 pub use folders::Pairing;
 pub use limits::{Limit, Limits, MapName, Measure, Sense, Statistic, Tier, WelchName};
+pub use outputs::{Inputs, Outputs};
 pub use pictures::{Drawn, Measured, side_by_side, write_maps};
 pub use region::{Rect, Region, Weights};
 pub use report::{Comparison, LimitReport, LimitState, Mode, Outcome, PairReport, VERSION};
 pub use sampled::WelchReport;
 
 use crate::{
-    disk::DiskError,
+    disk::{DiskError, is_zip},
     metrics::image::{Encoding, ImageError, Options},
     picture::{
         error_map::MapError,
@@ -171,6 +173,34 @@ pub enum CompareError {
         /// The other.
         file: PathBuf,
     },
+    /// A folder, and nothing to compare with it.
+    #[error("{} is a folder and {} does not exist: both must be images, or both folders of images", folder.display(), missing.display())]
+    Missing {
+        /// The folder.
+        folder: PathBuf,
+        /// What is not there.
+        missing: PathBuf,
+    },
+    /// An archive in place of images.
+    #[error("{} is a zip archive: unpack it first, and name the folder", file.display())]
+    Zip {
+        /// The archive.
+        file: PathBuf,
+    },
+    /// What would be written is what is read.
+    #[error("{option} would write over {}, which is read here: give it another name", file.display())]
+    Overwrites {
+        /// The option.
+        option: &'static str,
+        /// The file.
+        file: PathBuf,
+    },
+    /// Maps would lie among references.
+    #[error("--maps {}: this lies in the folder of the references, which is never written: name another folder", folder.display())]
+    IntoReferences {
+        /// The folder for maps.
+        folder: PathBuf,
+    },
     /// A limits file is malformed. The message names the line.
     #[error("{file}: {source}")]
     Limits {
@@ -200,6 +230,8 @@ pub enum Layer {
     Named(String),
     /// All of them, each for itself.
     All,
+    /// The main one as of [`Layer::Main`], and all of a file that has none.
+    MainOrAll,
 }
 
 /// An image of weights, black 0 and white 1.
@@ -304,6 +336,14 @@ pub fn compare(
             _ => continue,
         };
         return Err(CompareError::OwnLayer { file: file.to_owned(), why });
+    }
+    if let Some(file) = [reference, test].into_iter().find(|path| is_zip(path)) {
+        return Err(CompareError::Zip { file: file.to_owned() });
+    }
+    for (folder, missing) in [(reference, test), (test, reference)] {
+        if folder.is_dir() && !missing.exists() {
+            return Err(CompareError::Missing { folder: folder.into(), missing: missing.into() });
+        }
     }
     match (reference.is_dir(), test.is_dir()) {
         (true, true) => {}

@@ -18,7 +18,7 @@ use crate::{
     },
     stats::pixel_p_values,
 };
-use std::{collections::BTreeMap, path::Path};
+use std::{borrow::Cow, collections::BTreeMap, path::Path};
 
 /// Two files and what they are called.
 pub(super) struct Files<'a> {
@@ -49,6 +49,7 @@ impl Files<'_> {
     pub(super) fn compare(&self, settings: &Settings, keep: &mut Keep<'_>) -> Result<Vec<PairReport>, CompareError> {
         let (reference, test) = rayon::join(|| load(self.reference), || load(self.test));
         let (reference, test) = (reference?, test?);
+        let settings = &self.settled(settings, [&reference, &test])?;
         // Two layers of one file are no two of the same.
         let same = reference == test && settings.own[0].layer == settings.own[1].layer;
         let bytes = Bytes { same, reference: &reference, test: &test };
@@ -70,6 +71,25 @@ impl Files<'_> {
             let (r, t) = in_one_light(r, t, settings)?;
             self.layer(layer, &r, &t, settings, mask.as_ref(), sampled.as_ref(), keep)
         })
+    }
+
+    /// The settings for these two files, which say outright whether all layers are meant.
+    fn settled<'s>(
+        &self,
+        settings: &'s Settings,
+        [reference, test]: [&[u8]; 2],
+    ) -> Result<Cow<'s, Settings>, CompareError> {
+        if settings.layer != Layer::MainOrAll {
+            return Ok(Cow::Borrowed(settings));
+        }
+        // Exactly are compared all channels of a file together.
+        let layer = match settings.mode {
+            Mode::Metrics if !(read::has_main(self.reference, reference)? && read::has_main(self.test, test)?) => {
+                Layer::All
+            }
+            _ => Layer::Main,
+        };
+        Ok(Cow::Owned(Settings { layer, ..settings.clone() }))
     }
 
     /// The size of both by their headers, where it is one, before anything is decoded.
@@ -320,7 +340,7 @@ impl Files<'_> {
         let is_mean = match &settings.layer {
             Layer::Main => true,
             Layer::Named(name) => name == "mean",
-            Layer::All => false,
+            Layer::All | Layer::MainOrAll => false,
         };
         let is_mean = is_mean && settings.own.iter().all(|own| own.layer.is_none());
         if !is_mean || settings.mode == Mode::Exact || !settings.region.is_whole() || settings.mask.is_some() {
@@ -363,7 +383,7 @@ fn drawn(
 fn choice(settings: &Settings, side: usize) -> LayerChoice<'_> {
     match (&settings.own[side].layer, &settings.layer) {
         (Some(name), _) | (None, Layer::Named(name)) => LayerChoice::Named(name),
-        (None, Layer::Main) => LayerChoice::Main,
+        (None, Layer::Main | Layer::MainOrAll) => LayerChoice::Main,
         (None, Layer::All) => LayerChoice::All,
     }
 }

@@ -37,6 +37,18 @@ pub struct Measured<'a> {
     pub p: Option<&'a dyn Fn() -> Vec<f64>>,
 }
 
+/// All files that [`write_maps`] may write.
+pub(super) const FILES: [&str; 8] = [
+    "absolute.png",
+    "signed.png",
+    "ssim.png",
+    "flip.png",
+    "hdr-flip.png",
+    "p-value.png",
+    "maps.exr",
+    "side-by-side.png",
+];
+
 fn size(image: &Image) -> [u32; 2] {
     image.size().map(|n| n as u32)
 }

@@ -7,5 +7,5 @@ mod self_check;
 mod suite;
 
 pub use manifest::{Manifest, ManifestScene, ManifestSelfCheck};
-pub use scene::{KitError, write};
+pub use scene::{KitError, write_alone};
 pub use suite::{SCENES, SCORING, write_suite};

@@ -9,7 +9,11 @@ use crate::{
     scene_files,
     scenes::{Scene, SceneError, Sky},
 };
-use std::{io::Write, path::Path};
+use std::{fs, io::Write, path::Path};
+
+const PAGE: &str = "README.md";
+const REGIONS: &str = "regions.exr";
+const GBUFFER: &str = "gbuffer.exr";
 
 /// Why a kit could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -33,13 +37,40 @@ pub enum KitError {
     },
 }
 
-/// Writes `NAME.glb`, `NAME.toml`, `NAME.twin.glb` (where there is an occluder), `views.json`,
-/// `regions.exr`, `gbuffer.exr` and `README.md` into a folder.
+/// Writes a scene alone as [`write`] does, into a folder that may hold other things: over an earlier
+/// export of the same scene, but over no file that no export wrote.
+///
+/// # Errors
+/// As [`write`], and where such a file is there: then nothing is written.
+pub fn write_alone(scene: &Scene, folder: &Path) -> Result<(), KitError> {
+    let name = &scene.name;
+    let page = folder.join(PAGE);
+    // The page is written first, so that an export that was killed is known by it as well.
+    if !fs::read_to_string(&page).is_ok_and(|text| text.starts_with(&title(name)) && text.contains(&file_name(name))) {
+        let model = ["glb", "twin.glb", "toml"].map(|end| format!("{name}.{end}"));
+        let others = [PAGE, "views.json", REGIONS, GBUFFER];
+        for file in others.into_iter().chain(model.iter().map(String::as_str)) {
+            let path = folder.join(file);
+            // A link that leads nowhere is somebody's too.
+            if fs::symlink_metadata(&path).is_ok() {
+                let why =
+                    format!("no export of scene '{name}' wrote this file: name another folder; nothing is written");
+                return Err(DiskError::content(&path, why).into());
+            }
+        }
+    }
+    write(scene, folder)
+}
+
+/// Writes `README.md`, `NAME.glb`, `NAME.toml`, `NAME.twin.glb` (where there is an occluder), `views.json`,
+/// `regions.exr` and `gbuffer.exr` into a folder.
 ///
 /// # Errors
 /// Where a file cannot be written or the scene is too deep to trace.
 pub fn write(scene: &Scene, folder: &Path) -> Result<(), KitError> {
     let render = of_scene(scene);
+    let page = page(scene);
+    write_whole(&folder.join(PAGE), |out| out.write_all(page.as_bytes()))?;
     scene_files::write(scene, folder)?;
     if scene.has_occluder() {
         scene_files::write_glb(&scene.twin(), &folder.join(format!("{}.twin.glb", scene.name)))?;
@@ -52,7 +83,7 @@ pub fn write(scene: &Scene, folder: &Path) -> Result<(), KitError> {
     for region in Region::ALL {
         masks = masks.with(region.label(), regions.mask(region, view.pixels()));
     }
-    masks.write(&folder.join("regions.exr"))?;
+    masks.write(&folder.join(REGIONS))?;
     let channel = |f: &dyn Fn(&crate::render::gbuffer::Surface) -> f32| -> Vec<f32> {
         gbuffer.surfaces.iter().map(|s| s.as_ref().map_or(f32::NAN, f)).collect()
     };
@@ -62,16 +93,23 @@ pub fn write(scene: &Scene, folder: &Path) -> Result<(), KitError> {
             .with(&format!("position.{name}"), channel(&|s| s.point[axis]))
             .with(&format!("normal.{name}"), channel(&|s| s.normal[axis]));
     }
-    surfaces.write(&folder.join("gbuffer.exr"))?;
-    let page = page(scene);
-    write_whole(&folder.join("README.md"), |out| out.write_all(page.as_bytes()))?;
-    Ok(())
+    Ok(surfaces.write(&folder.join(GBUFFER))?)
 }
 
 /// What a renderer says of a scene.
 pub(super) fn of_scene(scene: &Scene) -> impl Fn(RenderError) -> KitError + use<> {
     let scene = scene.name.clone();
     move |source| KitError::Render { scene: scene.clone(), source }
+}
+
+/// How the page of a scene begins.
+fn title(name: &str) -> String {
+    format!("# {name}\n")
+}
+
+/// What the page says of how images are called.
+fn file_name(name: &str) -> String {
+    format!("`{name}.<estimator>.<rays>.<replicate>.exr`")
 }
 
 fn page(scene: &Scene) -> String {
@@ -84,7 +122,7 @@ fn page(scene: &Scene) -> String {
         String::new()
     };
     format!(
-        "# {name}\n\n{}\n\n\
+        "{}\n{}\n\n\
          ## What is here\n\n\
          - `{name}.glb`: the scene, metres, +Y up, right-handed (glTF 2.0). Nodes of occluders carry `extras.aogauge.occluder`.\n\
          - `{name}.toml`: the scene file for it, with the light and R; `aogauge scene show {name}.toml` reads both back as the same scene.\n{twin}\
@@ -99,9 +137,10 @@ fn page(scene: &Scene) -> String {
          5. AO needs no light. The judge's light is {}: see `environment` in `views.json`.\n\
          6. Several images with seeds of their own, better than one with more rays: intervals are taken over them.\n\n\
          ## How to name it\n\n\
-         `{name}.<estimator>.<rays>.<replicate>.exr`, 32-bit float, one channel `Y` (or the same value in R, G and B); \
+         {}, 32-bit float, one channel `Y` (or the same value in R, G and B); \
          for example `{name}.classic.32.0003.exr`.\n\n\
          Compare your positions with `gbuffer.exr` first: if they differ by more than rounding, the camera is wrong, not the AO.\n",
+        title(name),
         scene.description,
         m.transect.to_array(),
         scene.ao.radius,
@@ -112,5 +151,6 @@ fn page(scene: &Scene) -> String {
             Sky::Gradient { zenith, horizon, ground } =>
                 format!("a sky of radiance {zenith} at the zenith, {horizon} at the horizon and {ground} below"),
         },
+        file_name(name),
     )
 }

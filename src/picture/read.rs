@@ -326,6 +326,14 @@ pub fn layer_names(path: &Path, bytes: &[u8]) -> Result<Vec<String>, DiskError> 
     if is_exr(path, bytes) { read_exr::names(path, bytes) } else { Ok(Vec::new()) }
 }
 
+/// Whether one layer of an image stands for it: R, G and B, else Y, else `mean`, else the only one there is.
+///
+/// # Errors
+/// Where it is OpenEXR whose header cannot be read.
+pub fn has_main(path: &Path, bytes: &[u8]) -> Result<bool, DiskError> {
+    if is_exr(path, bytes) { read_exr::has_main(path, bytes) } else { Ok(true) }
+}
+
 /// Whether the bytes are OpenEXR, or no format is known by them and the extension
 /// says so.
 pub fn is_exr(path: &Path, bytes: &[u8]) -> bool {

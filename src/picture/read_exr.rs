@@ -9,7 +9,7 @@ use crate::{
     disk::DiskError,
     metrics::image::{Encoding, Image},
 };
-use exr::prelude::{FlatSamples, ReadChannels, ReadLayers};
+use exr::prelude::{FlatSamples, ReadChannels, ReadLayers, Text};
 use std::{collections::BTreeMap, io::Cursor, path::Path};
 
 /// The ending of a grey layer's channel, as OpenEXR viewers expect it.
@@ -39,6 +39,36 @@ pub(super) fn names(path: &Path, bytes: &[u8]) -> Result<Vec<String>, DiskError>
     let first = claim::exr(path, bytes)?.headers.into_iter().next();
     let channels = first.map(|h| h.channels.list).unwrap_or_default();
     Ok(channels.iter().map(|c| c.name.to_string()).map(|n| n.strip_suffix(GREY).unwrap_or(&n).to_owned()).collect())
+}
+
+/// Whether one layer stands for the image, by the headers alone.
+pub(super) fn has_main(path: &Path, bytes: &[u8]) -> Result<bool, DiskError> {
+    let headers = claim::exr(path, bytes)?.headers;
+    let mut channels = Channels { first: String::new(), all: BTreeMap::new() };
+    for (i, header) in headers.iter().enumerate() {
+        let prefix = prefix(headers.len(), i, header.own_attributes.layer_name.as_ref());
+        for channel in &header.channels.list {
+            let name = called(&prefix, &channel.name);
+            let numbers = Numbers::Float(Vec::new());
+            channels.all.insert(name.clone(), Channel { name, size: [0, 0], origin: [0, 0], numbers });
+        }
+        if i == 0 {
+            channels.first = prefix;
+        }
+    }
+    Ok(channels.main(path).is_ok())
+}
+
+/// What stands before the names of a part's channels.
+fn prefix(parts: usize, part: usize, name: Option<&Text>) -> String {
+    let name = name.map_or_else(|| format!("part-{part}"), ToString::to_string);
+    if parts > 1 { format!("{name}.") } else { String::new() }
+}
+
+/// What a channel is called here.
+fn called(prefix: &str, name: &Text) -> String {
+    let name = name.to_string();
+    prefix.to_owned() + name.strip_suffix(GREY).unwrap_or(&name)
 }
 
 /// Reads the layers asked for.
@@ -112,12 +142,10 @@ impl Channels {
         let parts = image.layer_data.len();
         let mut channels = Channels { first: String::new(), all: BTreeMap::new() };
         for (i, part) in image.layer_data.into_iter().enumerate() {
-            let name = part.attributes.layer_name.as_ref().map_or_else(|| format!("part-{i}"), ToString::to_string);
-            let prefix = if parts > 1 { format!("{name}.") } else { String::new() };
+            let prefix = prefix(parts, i, part.attributes.layer_name.as_ref());
             let at = part.attributes.layer_position;
             for channel in part.channel_data.list {
-                let name = channel.name.to_string();
-                let name = prefix.clone() + name.strip_suffix(GREY).unwrap_or(&name);
+                let name = called(&prefix, &channel.name);
                 let numbers = match channel.sample_data {
                     FlatSamples::F16(v) => Numbers::Float(v.into_iter().map(exr::prelude::f16::to_f32).collect()),
                     FlatSamples::F32(v) => Numbers::Float(v),

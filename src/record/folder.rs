@@ -51,7 +51,11 @@ impl RecordFolder {
         // Without a slash at its end, so that a name can be appended.
         let path = &path.components().collect::<PathBuf>();
         if path.file_name().is_none() {
-            return Err(DiskError::content(path, "name a folder for the record, not one that holds others"));
+            return Err(DiskError::content(
+                path,
+                "the folder of a record is moved aside to NAME.previous by the next run, so it must be given by its name: name \
+                 one, such as reports/latest",
+            ));
         }
         let occupied = match fs::read_dir(path) {
             Ok(mut entries) => entries.next().is_some(),

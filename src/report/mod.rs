@@ -76,6 +76,14 @@ pub enum ReportError {
         /// Those of the measure view.
         wanted: [u32; 2],
     },
+    /// A scene has no pixel to be shown.
+    #[error(
+        "scene '{scene}': no column of its measure view lies within R of the middle, as transect in record.json has it"
+    )]
+    Transect {
+        /// The scene.
+        scene: String,
+    },
     /// Two images of the record do not fit each other.
     #[error("{image}: no error map can be drawn: {source}")]
     Map {
@@ -110,6 +118,10 @@ pub fn write(record_folder: &Path, out: &Path) -> Result<Record, ReportError> {
 /// # Errors
 /// Where an image cannot be read, or the report not written.
 pub fn write_markdown(record: &Record, record_folder: &Path, out: &Path, embed: bool) -> Result<(), ReportError> {
+    // Before anything is drawn, so that no half of a report is left.
+    if let Some(scene) = record.scenes.iter().find(|s| !s.transect.iter().any(|&t| is_shown(t))) {
+        return Err(ReportError::Transect { scene: scene.name.clone() });
+    }
     let aside = if embed {
         Some(tempfile::tempdir().map_err(DiskError::io(&std::env::temp_dir(), "make a folder"))?)
     } else {
@@ -237,10 +249,15 @@ fn shown_instead<'a>(record: &'a Record, scene: &SceneRecord, method: &str) -> O
     own.filter(|c| c.image.is_some()).max_by_key(|c| c.case.rays)
 }
 
+/// Whether a column of a measure image is shown, by its place along the transect in R.
+fn is_shown(place: f64) -> bool {
+    place.abs() <= 1.04
+}
+
 /// The columns of a measure image within R of its centre, so that pictures are
 /// small enough to stand side by side; profiles show the rest.
 fn middle(scene: &SceneRecord, values: &[f32]) -> (Vec<f32>, [u32; 2]) {
-    let columns: Vec<usize> = (0..scene.transect.len()).filter(|&x| scene.transect[x].abs() <= 1.04).collect();
+    let columns: Vec<usize> = (0..scene.transect.len()).filter(|&x| is_shown(scene.transect[x])).collect();
     let rows = values.chunks_exact(scene.transect.len().max(1));
     let height = rows.len() as u32;
     (rows.flat_map(|row| columns.iter().map(|&x| row[x])).collect(), [columns.len() as u32, height])

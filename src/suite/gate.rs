@@ -6,7 +6,10 @@ use crate::{
     metrics::{MetricName, regions::Region},
 };
 use schemars::JsonSchema;
-use serde::{Deserialize, Deserializer, Serialize, de::Error};
+use serde::{
+    Deserialize, Deserializer, Serialize,
+    de::{Error, IntoDeserializer, value},
+};
 use std::fmt::Display;
 
 /// The confidences a gate may ask for.
@@ -35,6 +38,32 @@ fn usual() -> f64 {
     CONFIDENCE
 }
 
+/// The metrics that may be gated.
+const GATED: [MetricName; 12] = [
+    MetricName::Openness,
+    MetricName::Contrast,
+    MetricName::Michelson,
+    MetricName::JudgeContrast,
+    MetricName::ContrastError,
+    MetricName::Removed,
+    MetricName::Bias,
+    MetricName::Mae,
+    MetricName::Rmse,
+    MetricName::OverDarkening,
+    MetricName::RendererDifference,
+    MetricName::DistinctReplicates,
+];
+
+/// Reads a metric's name. Those that are never gated are known, and refused by what they are.
+fn gated<'de, D: Deserializer<'de>>(d: D) -> Result<MetricName, D::Error> {
+    let name = String::deserialize(d)?;
+    let read = MetricName::deserialize(name.as_str().into_deserializer());
+    read.map_err(|_: value::Error| {
+        let known = GATED.map(|m| format!("`{}`", m.label())).join(", ");
+        D::Error::custom(format!("unknown metric `{name}`, expected one of {known}"))
+    })
+}
+
 /// `[[gate]]`: a limit on a metric. Filters that are absent or empty let
 /// everything through.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -43,6 +72,7 @@ pub struct GateFile {
     /// What it makes sure of, in a sentence.
     pub name: String,
     /// The metric.
+    #[serde(deserialize_with = "gated")]
     pub metric: MetricName,
     /// The region, for metrics that are taken over one.
     pub region: Option<Region>,
@@ -187,7 +217,7 @@ impl GateFile {
     }
 
     fn check_metric(&self) -> Result<(), String> {
-        if matches!(self.metric, MetricName::JudgeBias | MetricName::JudgeMae | MetricName::JudgeRmse) {
+        if !GATED.contains(&self.metric) {
             return Err(format!(
                 "{} is reported but never gated: it measures the direction of light more than AO; gate contrast-error",
                 self.metric.label()

@@ -401,6 +401,8 @@ mod tests {
             ("[[gate]]\nname = 'g'\nmetric = 'judge-mae'\nregion = 'left'\nmax = 0.5", "judge-mae is reported but"),
             ("[[gate]]\nname = 'g'\nmetric = 'judge-rmse'\nregion = 'left'\nmax = 0.5", "judge-rmse is reported but"),
             ("[[gate]]\nname = 'g'\nmetric = 'removed'\nmin = nan", "finite"),
+            ("[[gate]]\nname = 'g'\nmetric = 'judge'\nmin = 1", "`rmse`, `over-darkening`, "),
+            ("[[gate]]\nname = 'g'\nmetric = 3\nmin = 1", "invalid type: integer `3`"),
             (&gate("max = 0.5\nmin = 0.1"), "exactly one limit: min, max, or equals together with within; min and max"),
             (&gate(""), "none of them is given"),
             (&gate("equals = 0.5"), "equals alone is given"),

@@ -231,6 +231,22 @@ fn missing_files_and_unknown_names_are_named() {
     assert!(run(&path, &out, 2, &[]).contains("scene.toml"));
     expect(2, &["run", "--no-such-flag"]);
     expect(2, &["report", text(dir.path())]);
+    let zip = dir.path().join("record.zip");
+    fs::write(&zip, "PK").unwrap();
+    assert!(expect(2, &["report", text(&zip)]).contains("record.zip: this is a zip archive: unpack it first"));
+    // What may be gated is listed, and nothing that may not.
+    let (gated, path) = folder(&scene(|s| s), &suite("[[gate]]\nname = 'g'\nmetric = 'contrast-eror'\nmax = 1"));
+    let told = run(&path, &gated.path().join("out"), 2, &[]);
+    assert!(told.contains("`contrast-eror`") && told.contains("`contrast-error`"), "{told}");
+    assert!(!told.contains("judge-bias") && !told.contains("judge-mae") && !told.contains("judge-rmse"), "{told}");
+    // A folder without a name of its own, empty or not.
+    let empty = dir.path().join("empty");
+    fs::create_dir(&empty).unwrap();
+    let here = ["run", "smoke", "--renderer", "cpu", "--out", "."];
+    let here = Command::new(env!("CARGO_BIN_EXE_aogauge")).current_dir(&empty).args(here).output().unwrap();
+    let told = String::from_utf8_lossy(&here.stderr);
+    assert!(told.contains("moved aside to NAME.previous by the next run, so it must be given by its name"), "{told}");
+    assert_eq!(fs::read_dir(&empty).unwrap().count(), 0);
     assert!(!out.exists());
 }
 
@@ -628,6 +644,34 @@ fn no_driver_is_no_error_unless_a_gpu_is_asked_for() {
     assert_eq!(record(&out)["seed"], 1, "the older record stays");
 }
 
+/// Over an export of the same scene, and over nothing else.
+fn exported_over(dir: &Path, kit: &Path) {
+    let mine = dir.join("mine");
+    fs::create_dir(&mine).unwrap();
+    for file in ["README.md", "pillar.glb", "pillar.toml", "views.json", "gbuffer.exr"] {
+        fs::write(mine.join(file), "# pillar\n\nmine").unwrap();
+        let before = files(&mine);
+        let told = expect(2, &["scene", "export", "pillar", "--out", text(&mine)]);
+        assert!(told.contains(file) && told.contains("no export of scene 'pillar' wrote this file"), "{told}");
+        assert!(files(&mine) == before, "{file}");
+        fs::remove_file(mine.join(file)).unwrap();
+    }
+    fs::write(mine.join("notes.txt"), "mine").unwrap();
+    expect(0, &["scene", "export", "pillar", "--out", text(&mine)]);
+    assert_eq!(fs::read_to_string(mine.join("notes.txt")).unwrap(), "mine");
+
+    let before = files(kit);
+    assert!(expect(2, &["scene", "export", "plane", "--out", text(kit)]).contains("no export of scene 'plane' wrote"));
+    let own = kit.join("pillar.toml");
+    let told = expect(2, &["scene", "export", text(&own), "--out", text(kit)]);
+    assert!(told.contains("written over its own file"), "{told}");
+    assert!(files(kit) == before);
+    // The same scene again, and what was left of it by an export that was killed.
+    fs::remove_file(kit.join("regions.exr")).unwrap();
+    expect(0, &["scene", "export", "pillar", "--out", text(kit)]);
+    assert!(files(kit) == before);
+}
+
 #[test]
 fn a_scene_can_be_shown_and_taken_elsewhere() {
     let dir = tempfile::tempdir().unwrap();
@@ -666,6 +710,7 @@ fn a_scene_can_be_shown_and_taken_elsewhere() {
     {
         assert!(kit.join(file).exists(), "{file}");
     }
+    exported_over(dir.path(), &kit);
     let masks = aogauge::layers::Layers::read(&kit.join("regions.exr")).unwrap();
     assert_eq!(masks.layers["footprint"].iter().sum::<f32>(), 384.0);
     let surfaces = aogauge::layers::Layers::read(&kit.join("gbuffer.exr")).unwrap();

@@ -269,6 +269,51 @@ fn maps_are_pictures_and_numbers() {
     assert_eq!(maps.attributes["signed.to"], "0.25");
 }
 
+/// However the file is spelled, and whichever of the inputs it is.
+#[test]
+fn nothing_that_is_read_is_written_over() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path();
+    pictures(folder);
+    image::GrayImage::from_pixel(40, 30, Luma([255])).save(folder.join("m.png")).unwrap();
+    let files = || ["a.png", "b.png", "m.png"].map(|f| std::fs::read(folder.join(f)).unwrap());
+    let before = files();
+    let absolute = folder.join("a.png");
+    let mut ways = vec!["a.png", "./b.png", "m.png", "nosuch/../a.png", absolute.to_str().unwrap()];
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("a.png", folder.join("link.png")).unwrap();
+        std::os::unix::fs::symlink(".", folder.join("here")).unwrap();
+        ways.extend(["link.png", "here/b.png"]);
+    }
+    for diff in ways {
+        for more in [&[][..], &["--exact"]] {
+            let out = compare(folder, &[&["a.png", "b.png", "--mask", "m.png", "--diff", diff], more].concat());
+            assert_eq!(out.status.code(), Some(2), "{diff}");
+            assert!(text(&out.stderr).contains("--diff would write over"), "{diff}: {}", text(&out.stderr));
+            assert!(files() == before && !folder.join("nosuch").exists(), "{diff}");
+        }
+    }
+
+    // Every file that maps are written to may be an input.
+    record_image(&folder.join("a.exr"), 1, 0.0);
+    record_image(&folder.join("b.exr"), 2, 0.0);
+    let out = compare(folder, &["a.exr", "b.exr", "--hdr", "--maps", "m"]);
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+    let names = || -> Vec<_> { std::fs::read_dir(folder.join("m")).unwrap().map(|e| e.unwrap().path()).collect() };
+    let maps: Vec<_> = names().iter().map(|path| std::fs::read(path).unwrap()).collect();
+    assert_eq!(maps.len(), 8, "{:?}", names());
+    for file in names() {
+        let file = file.to_str().unwrap();
+        for pair in [[file, "a.exr"], ["a.exr", file]] {
+            let out = compare(folder, &[&pair[..], &["--maps", "./m"]].concat());
+            assert_eq!(out.status.code(), Some(2), "{file}");
+            assert!(text(&out.stderr).contains("--maps would write over ./m/"), "{}", text(&out.stderr));
+        }
+    }
+    assert!(names().iter().map(|path| std::fs::read(path).unwrap()).eq(maps));
+}
+
 #[test]
 fn nan_is_counted_and_told() {
     let folder = tempfile::tempdir().unwrap();

@@ -136,13 +136,17 @@ fn nothing_to_compare_records_and_mixtures() {
     let root = tempfile::tempdir().unwrap();
     folders(root.path());
     fs::create_dir_all(root.path().join("empty")).unwrap();
+    fs::write(root.path().join("artifact.ZIP"), "PK").unwrap();
     assert_eq!(compare(root.path(), &["empty", "empty"]).status.code(), Some(4));
     assert_eq!(compare(root.path(), &["empty", "b"]).status.code(), Some(4), "new images alone compare nothing");
     assert_eq!(compare(root.path(), &["a", "empty"]).status.code(), Some(1));
     assert_eq!(compare(root.path(), &["a", "empty", "--allow-missing"]).status.code(), Some(4));
     for (args, message) in [
         (["a", "b/equal.png"], "a is a folder and b/equal.png is none"),
-        (["a", "nowhere"], "a is a folder and nowhere is none"),
+        (["a", "nowhere"], "a is a folder and nowhere does not exist"),
+        (["nowhere", "a"], "a is a folder and nowhere does not exist"),
+        (["a", "artifact.ZIP"], "artifact.ZIP is a zip archive: unpack it first"),
+        (["artifact.ZIP", "b/equal.png"], "artifact.ZIP is a zip archive: unpack it first"),
         (["nowhere", "nothing"], "nowhere: cannot read the image"),
     ] {
         let out = compare(root.path(), &args);
@@ -155,6 +159,40 @@ fn nothing_to_compare_records_and_mixtures() {
     let out = compare(root.path(), &["a", "b"]);
     assert_eq!(out.status.code(), Some(2));
     assert!(text(&out.stderr).contains("b is a record (it has a record.json)"), "{}", text(&out.stderr));
+}
+
+/// Nor are maps put among the references, where the next run would miss them in the other folder.
+#[test]
+fn no_image_of_a_folder_is_written_over() {
+    let root = tempfile::tempdir().unwrap();
+    folders(root.path());
+    let listed = || {
+        let mut found = Vec::new();
+        for folder in ["a", "b"] {
+            let entries = fs::read_dir(root.path().join(folder)).unwrap();
+            found.extend(entries.map(|e| e.unwrap().path()).map(|p| (fs::read(&p).ok(), p)));
+        }
+        found.sort();
+        found
+    };
+    let before = listed();
+    let mut ways = vec![("a", "never written"), ("a/maps", "never written"), ("b/../a/./maps", "never written")];
+    ways.push(("b", "--maps would write over b/"));
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("b", root.path().join("link")).unwrap();
+        std::os::unix::fs::symlink("a", root.path().join("other")).unwrap();
+        ways.extend([("link", "--maps would write over link/"), ("other/maps", "never written")]);
+    }
+    for (maps, says) in ways {
+        let out = compare(root.path(), &["a", "b", "--maps", maps]);
+        assert_eq!(out.status.code(), Some(2), "{maps}");
+        assert!(text(&out.stderr).contains(says), "{maps}: {}", text(&out.stderr));
+        assert!(listed() == before, "{maps}");
+    }
+    // A folder within the test folder is its owner's business.
+    assert_ne!(compare(root.path(), &["a", "b", "--maps", "b/maps"]).status.code(), Some(2));
+    assert!(root.path().join("b/maps").is_dir());
 }
 
 #[test]

@@ -540,6 +540,23 @@ fn images_of_records_are_compared_as_folders_where_asked() {
         let [_, err] = compare(2, one, two, args);
         assert!(err.contains(says), "{err}");
     }
+    // Where no layer stands for an image, every layer is compared; where one does, it is, by its replicates too.
+    let maps = RUNS.dir.path().join("maps");
+    let all: Value = {
+        let [out, _] = compare(0, one, two, &["--images", "--format", "json", "--maps", text(&maps)]);
+        serde_json::from_str(&out).unwrap()
+    };
+    let pairs = all["pairs"].as_array().unwrap();
+    let of = |path: &str| -> Vec<_> { pairs.iter().filter(|p| p["path"] == path).collect() };
+    let case = of("scene/classic.cpu.4.exr");
+    assert!(case.len() == 1 && case[0]["layer"] == "mean" && case[0]["welch"].is_object(), "{case:?}");
+    for (image, layer) in [("judge", "q"), ("regions", "region-footprint"), ("look", "path-traced")] {
+        let found = of(&format!("scene/{image}.exr"));
+        assert!(found.len() > 1 && found.iter().any(|p| p["layer"] == layer), "{image}: {found:?}");
+        assert!(maps.join(format!("scene/{image}.exr/{layer}/maps.exr")).exists(), "{image}");
+    }
+    let [named, _] = compare(0, one, two, &["--images", "--exact"]);
+    assert!(named.contains("scene/judge.exr ") && !named.contains("ERROR"), "{named}");
     let [_, err] = compare(2, &one.join("images"), &two.join("images"), &["--images"]);
     assert!(err.contains("--images takes the images of two records"), "{err}");
     let [_, err] = compare(2, &one.join("images"), two, &[]);

@@ -63,9 +63,11 @@ fn nothing_is_overwritten_and_nothing_is_written_by_half() {
     assert!(help.contains("Example") && help.contains("--force"), "{help}");
     let stderr = init(0, &dir, &["--ci", "gitlab"]);
     assert!(stderr.contains("include: [{ local: .gitlab/aogauge.yml }]"), "{stderr}");
+    assert!(stderr.contains("add reports/, aogauge-record/, aogauge-base/ and aogauge-comment.md to"), "{stderr}");
     assert!(files(&dir).contains(".gitlab/aogauge.yml"));
     let dir = root.path().join("none");
-    init(0, &dir, &["--ci", "none"]);
+    // What the command that it names to try writes.
+    assert!(init(0, &dir, &["--ci", "none"]).contains("add reports/ to .gitignore"));
     assert_eq!(files(&dir), ["aogauge.toml".to_owned()].into());
     #[cfg(unix)]
     {

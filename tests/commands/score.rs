@@ -67,6 +67,8 @@ fn world() -> &'static Path {
         let at = |name: &str| folder.join(name).display().to_string();
         fs::write(at("kit.toml"), SUITE).unwrap();
         ok(&["scene", "export", "--suite", &at("kit.toml"), "--out", &at("kit"), "--no-cache"]);
+        let page = fs::read_to_string(at("kit/README.md")).unwrap();
+        assert!(page.contains("with seeds of their own**, 4 at least: intervals"), "{page}");
         ok(&["run", &at("kit.toml"), "--renderer", "cpu", "--no-cache", "--no-base", "--out", &at("run")]);
         let scene = at("kit/scenes/self-check/self-check.toml");
         ok(&["render", &scene, "--rays", "16", "--replicates", "2", "--out", &at("self-check.exr")]);

@@ -96,7 +96,7 @@ fn a_run_is_held_against_a_base_and_explains_itself() {
     let (code, text) = run(&suite, &base, &["--no-base"]);
     assert_eq!(code, 0, "{text}");
     assert!(text.contains("there is no base record to hold it against (--no-base)") && text.contains("WARN"), "{text}");
-    let counts = "1 passed, 0 failed, 0 inconclusive, 1 known failures, 1 warnings, 3 not run";
+    let counts = "1 passed, 0 failed, 0 inconclusive, 1 known failure, 1 warning, 3 not run";
     assert!(text.contains(counts) && text.ends_with("report.md: pass\n"), "{text}");
     let (code, text) = run(&suite, &none, &["--no-base", "--base", base.to_str().unwrap()]);
     assert!(code == 2 && text.contains("cannot be used with"), "{text}");

@@ -358,7 +358,7 @@ fn a_record_of_less_than_its_suite_prunes_nothing() {
     zipped(&RUNS.out[0], &zip, "artifact/");
     let args = ["golden", "prune", text(&zip), "--goldens", text(&goldens)];
     assert!(expect(5, &args).contains("give it too"));
-    assert!(expect(0, &[&args[..], &[suite]].concat()).contains("1 goldens removed; 2 cases"));
+    assert!(expect(0, &[&args[..], &[suite]].concat()).contains("1 golden removed; 2 cases"));
     fs::write(&zip, "PK, but no archive").unwrap();
     assert!(expect(2, &args).contains("zip file"));
     let nowhere = dir.path().join("nowhere");

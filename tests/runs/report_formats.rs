@@ -216,6 +216,56 @@ fn the_formats_and_the_exit_code_agree() {
     }
 }
 
+/// A record that was edited by hand is what its verdicts say, in every sentence.
+#[test]
+fn counts_are_those_of_the_verdicts() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut record = serde_json::to_value(stored()).unwrap();
+    let pass = record["summary"]["pass"].as_u64().unwrap();
+    record["summary"]["pass"] = json!(77);
+    let folder = written(dir.path(), &record);
+    let args = ["report", text(&folder), "--format", "junit,github,json", "--gate"];
+    let (code, out, told) = aogauge(&args);
+    let says = |passed: u64, failed: u64| format!("{passed} passed, {failed} failed, 0 inconclusive, 1 known failure");
+    assert!(code == 0 && told.contains(&says(pass, 0)) && !told.contains("77 passed"), "{told}");
+    assert!(!told.contains("known failures"), "{told}");
+    assert_eq!(serde_json::from_str::<Value>(&out).unwrap()["summary"]["pass"], pass);
+    assert!(fs::read_to_string(folder.join("summary.md")).unwrap().contains(&says(pass, 0)));
+
+    let passed = record["verdicts"].as_array().unwrap().iter().position(|v| v["outcome"] == "pass").unwrap();
+    record["verdicts"][passed]["outcome"] = json!("fail");
+    written(dir.path(), &record);
+    let (code, _, told) = aogauge(&args);
+    assert!(code == 1 && told.contains(&says(pass - 1, 1)), "{told}");
+}
+
+/// The help and docs/reports.md name each exit code and outcome there is.
+#[test]
+fn every_exit_code_is_told() {
+    let (_, help, _) = aogauge(&["report", "--help"]);
+    let docs = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reports.md")).unwrap();
+    let codes = docs.lines().find(|l| l.contains("with `--gate`, where they are made")).unwrap();
+    let outcomes = docs.lines().find(|l| l.starts_with("| `outcome`, `exit_code`")).unwrap();
+    for (code, end) in [(0, End::Pass), (1, End::Fail), (4, End::Nothing), (5, End::Incomplete), (6, End::Inconclusive)]
+    {
+        assert!(help.contains(&format!("{code} ")) && codes.contains(&code.to_string()), "{code}: {help}{codes}");
+        let name = serde_json::to_value(end).unwrap();
+        assert!(outcomes.contains(&format!("`{}`", name.as_str().unwrap())), "{name}: {outcomes}");
+    }
+}
+
+/// Numbers that no run writes are refused before a picture is drawn.
+#[test]
+fn a_scene_without_a_middle_leaves_no_half_of_a_report() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut record = stored();
+    record.scenes[0].transect.fill(1e308);
+    let folder = written(dir.path(), &record);
+    let (code, _, told) = aogauge(&["report", text(&folder)]);
+    assert!(code == 2 && told.contains("scene 'curtain-arcade': no column of its measure view"), "{told}");
+    assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
+}
+
 #[test]
 fn json_tells_a_script_what_stopped_the_merge() {
     let dir = tempfile::tempdir().unwrap();

@@ -6,8 +6,8 @@ mod table;
 use super::{Exit, Failure, json, print, run::bar, tell};
 use crate::{
     compare::{
-        CompareError, Drawn, Layer, Limit, Limits, Mask, Mode, Outcome, Own, PairReport, Rect, Region, Settings,
-        compare, side_by_side, write_maps,
+        CompareError, Drawn, Inputs, Layer, Limit, Limits, Mask, Mode, Outcome, Outputs, Own, PairReport, Rect, Region,
+        Settings, compare, side_by_side, write_maps,
     },
     layers::write_png,
     metrics::image::{DEFAULT_PPD, Encoding, Options},
@@ -43,7 +43,8 @@ pub struct Args {
     /// What is compared: an image, FILE.exr:LAYER, a folder with images of the same relative
     /// paths, or a record.
     test: PathBuf,
-    /// Compare the images of two records as folders of images.
+    /// Compare the images of two records as folders of images; of those without one layer
+    /// that stands for the rest, such as the judge's, every layer.
     #[arg(long)]
     images: bool,
     /// The pixel-exact metric alone: how many pixels differ, and by how much. Fast.
@@ -105,7 +106,7 @@ pub struct Args {
     #[arg(long)]
     ssimulacra2: bool,
     /// Folder for error maps: pictures with their scale, maps.exr with the numbers, and
-    /// side-by-side.png; of folders, a folder an image.
+    /// side-by-side.png; of folders, a folder an image. Nothing that is read is written over.
     #[arg(long, value_name = "DIR")]
     maps: Option<PathBuf>,
     /// The difference of two images. FILE.png: one picture of reference, test image and FLIP
@@ -140,6 +141,12 @@ impl DiffFile {
                 Err("the name must end in .png, for a picture, or in .exr, for the signed difference as numbers"
                     .to_owned())
             }
+        }
+    }
+
+    fn path(&self) -> &Path {
+        match self {
+            DiffFile::Picture(path) | DiffFile::Numbers(path) => path,
         }
     }
 
@@ -193,6 +200,7 @@ impl Args {
         let layer = match &self.layer {
             Some(name) => Layer::Named(name.clone()),
             None if self.all_layers => Layer::All,
+            None if self.images => Layer::MainOrAll,
             None => Layer::Main,
         };
         Ok(Settings {
@@ -216,6 +224,18 @@ impl Args {
         })
     }
 
+    /// Whether an image may have several reports, one a layer.
+    fn by_layer(&self) -> bool {
+        self.all_layers || self.images && self.layer.is_none()
+    }
+
+    /// Refuses to write over what is read.
+    fn check_outputs(&self, reference: &Path, test: &Path, mask: Option<&Mask>) -> Result<(), CompareError> {
+        let diff = self.diff.as_ref().map(DiffFile::path);
+        let outputs = Outputs { maps: self.maps.as_deref(), by_layer: self.by_layer(), diff };
+        outputs.check(&Inputs { reference, test, mask: mask.map(|m| &*m.path), limits: self.limits.as_deref() })
+    }
+
     /// Of folders, maps lie in a folder an image; of all layers, in one a layer.
     fn maps_folder(&self, root: &Path, report: &PairReport) -> PathBuf {
         let mut folder = root.to_owned();
@@ -223,7 +243,7 @@ impl Args {
             folder.extend(report.path.split('/'));
         }
         match &report.layer {
-            Some(layer) if self.all_layers => folder.join(file_name(layer)),
+            Some(layer) if self.by_layer() => folder.join(file_name(layer)),
             _ => folder,
         }
     }
@@ -265,6 +285,7 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
             "--diff draws one picture of two images: --maps leaves a side-by-side.png for each of many",
         ));
     }
+    args.check_outputs(&reference, &test, settings.mask.as_ref())?;
     let mut drawn = |report: &PairReport, drawn: &Drawn<'_>| {
         if let (Some(root), Some(measured)) = (&args.maps, &drawn.measured) {
             write_maps(&args.maps_folder(root, report), measured, args.scale)?;

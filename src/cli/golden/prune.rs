@@ -3,7 +3,7 @@
 use super::{Exit, Failure, notice, pending, print, tell};
 use crate::{
     golden::{Candidates, Slot, Store, named_by_record, named_by_suite},
-    record::Record,
+    record::{Record, counted},
     suite::{BUILT_IN, Suite},
 };
 use std::{
@@ -41,7 +41,7 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
         pending(store.is_interrupted()?);
     }
     let done = if args.dry_run { "would be removed" } else { "removed" };
-    tell(&format!("{} goldens {done}; {} cases are named", orphans.len(), named.len()));
+    tell(&format!("{} {done}; {} cases are named", counted(orphans.len(), "golden"), named.len()));
     Ok(Exit::Pass)
 }
 

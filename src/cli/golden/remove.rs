@@ -1,7 +1,10 @@
 //! `aogauge golden remove`
 
 use super::{Exit, Failure, notice, print, tell};
-use crate::golden::{Slot, Store};
+use crate::{
+    golden::{Slot, Store},
+    record::counted,
+};
 use std::{
     collections::BTreeSet,
     ffi::{OsStr, OsString},
@@ -41,7 +44,7 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     for slot in &slots {
         print(&format!("{}\n", store.path(slot).display()))?;
     }
-    tell(&format!("{} goldens removed", slots.len()));
+    tell(&format!("{} removed", counted(slots.len(), "golden")));
     Ok(Exit::Pass)
 }
 

@@ -9,12 +9,15 @@ use crate::{
     },
     judge_cache::JudgeCache,
     kit::{self, KitError},
-    record::Machine,
+    record::{Machine, counted},
     render::cpu::Cpu,
     run::{Means, Prepared, Stop},
     suite::{Plan, Platform, Suite},
 };
-use std::path::PathBuf;
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 /// Pack scenes for another renderer: glb with and without the occluder, views, G-buffer,
 /// and a page that says what to render. Of a suite also judge, converged images and region maps, so that
@@ -31,7 +34,8 @@ pub struct Args {
     /// are scored against.
     #[arg(long)]
     suite: Option<String>,
-    /// The folder to write into. Of a suite it must be empty.
+    /// The folder to write into. Of a suite it must be empty; of a scene nothing in it is replaced but an earlier
+    /// export of the same scene.
     #[arg(long)]
     out: PathBuf,
     /// Seed of the judge and the converged images; the suite's unless given.
@@ -56,12 +60,25 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     match (&args.suite, &args.scene) {
         (Some(suite), _) => of_suite(args, suite),
         (None, Some(scene)) => {
-            let scene = load(scene)?;
-            kit::write(&scene, &args.out)?;
+            let file = scene;
+            let scene = load(file)?;
+            check_own(Path::new(file), &args.out.join(format!("{}.toml", scene.name)))?;
+            kit::write_alone(&scene, &args.out)?;
             tell(&format!("{}: scene '{}' is packed", args.out.display(), scene.name));
             Ok(Exit::Pass)
         }
         (None, None) => Err(Failure::usage("name a scene, or a suite with --suite".to_owned())),
+    }
+}
+
+/// Refuses to write a scene file over the one that was read: what its author wrote would be gone.
+fn check_own(file: &Path, out: &Path) -> Result<(), Failure> {
+    match (fs::canonicalize(file), fs::canonicalize(out)) {
+        (Ok(file), Ok(there)) if file == there => Err(Failure::usage(format!(
+            "{}: the scene would be written over its own file: name another folder",
+            out.display()
+        ))),
+        _ => Ok(()),
     }
 }
 
@@ -76,7 +93,7 @@ fn of_suite(args: &Args, suite: &str) -> Result<Exit, Failure> {
     let means = Means { cache: cache.as_ref(), stop, ..Means::new(&Cpu, machine) };
     kit::write_suite(&prepared, &suite, &means, &args.out, &bar())?;
     let readme = args.out.join("README.md");
-    let scenes = suite.scenes.len();
-    tell(&format!("{}: {scenes} scenes of suite '{}' are packed; begin here", readme.display(), suite.name));
+    let scenes = counted(suite.scenes.len(), "scene");
+    tell(&format!("{}: {scenes} of suite '{}' are packed; begin here", readme.display(), suite.name));
     Ok(Exit::Pass)
 }

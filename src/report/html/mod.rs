@@ -7,7 +7,7 @@ mod rows;
 use super::{ReportError, definitions};
 use crate::{
     disk::write_whole,
-    record::Record,
+    record::{Record, counted},
     viewer::{Page, Planes},
 };
 pub(crate) use pairs::SceneImages;
@@ -53,7 +53,12 @@ fn page(folder: &Path, record: &Record) -> Result<String, ReportError> {
         title: record.suite.name.clone(),
         outcome: rows::overall(record),
         label: record.handed_in.as_ref().map(|by| format!("images of {}, handed in", by.renderer)),
-        summary: format!("{} in {} cases. {}", record.summary_line(), record.summary.cases, record.suite.description),
+        summary: format!(
+            "{} in {}. {}",
+            record.summary_line(),
+            counted(record.summary.cases, "case"),
+            record.suite.description
+        ),
         notes: rows::notes(record),
         gates: rows::gates(record),
         items,

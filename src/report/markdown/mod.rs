@@ -23,7 +23,7 @@ use crate::{
     disk::DiskError,
     gate::{CONFIDENCE, Outcome},
     metrics::Metric,
-    record::{End, Record, pictures},
+    record::{End, Record, counted, pictures},
     untrusted,
 };
 use attention::Attention;
@@ -51,6 +51,8 @@ struct Context<'a> {
     headline: &'static str,
     sign: &'static str,
     summary: String,
+    /// `2 cases of 1 scene`.
+    cases: String,
     replicates: String,
     /// What must be known of images that were handed in.
     handed_in: Vec<String>,
@@ -172,6 +174,7 @@ fn context<'a>(record: &'a Record, gallery: &Gallery, brief: bool) -> Result<Con
         headline,
         sign,
         summary: record.summary_line(),
+        cases: format!("{} of {}", counted(record.summary.cases, "case"), counted(record.scenes.len(), "scene")),
         replicates: replicates(record),
         handed_in: handed_in::notes(record),
         brief,
