@@ -353,7 +353,7 @@ fn a_record_of_less_than_its_suite_prunes_nothing() {
     copied(&RUNS.out[0], &partial);
     fs::create_dir(goldens.join("gone")).unwrap();
     fs::copy(goldens.join("scene/classic.4.exr"), goldens.join("gone/classic.4.exr")).unwrap();
-    assert!(prune(0, &[suite, "--dry-run"]).contains("1 goldens would be removed; 2 cases"));
+    assert!(prune(0, &[suite, "--dry-run"]).contains("1 golden would be removed; 2 cases"));
     let zip = dir.path().join("a.zip");
     zipped(&RUNS.out[0], &zip, "artifact/");
     let args = ["golden", "prune", text(&zip), "--goldens", text(&goldens)];
