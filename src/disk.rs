@@ -77,6 +77,11 @@ pub fn is_part(name: &str) -> bool {
     name.starts_with(PART[0]) && name.ends_with(PART[1])
 }
 
+/// Whether two paths lead to the same file or folder, links followed; not where one leads nowhere.
+pub(crate) fn is_same(a: &Path, b: &Path) -> bool {
+    fs::canonicalize(a).is_ok_and(|a| fs::canonicalize(b).is_ok_and(|b| a == b))
+}
+
 /// Whether it is a file that calls itself a zip archive, as CI systems hand out artifacts.
 pub(crate) fn is_zip(path: &Path) -> bool {
     path.extension().is_some_and(|end| end.eq_ignore_ascii_case("zip")) && path.is_file()

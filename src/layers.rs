@@ -189,6 +189,11 @@ pub fn pixel_hash(values: &[f32]) -> String {
     hex(&sha.finalize())
 }
 
+/// The first twelve digits of a hash, which tell it from others to people.
+pub fn short_hash(hash: &str) -> &str {
+    hash.get(..12).unwrap_or(hash)
+}
+
 /// Bytes as hexadecimal digits.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()

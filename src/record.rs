@@ -208,9 +208,9 @@ impl Summary {
     }
 }
 
-/// So many of a thing: `1 case`, `2 cases`.
-pub(crate) fn counted(n: usize, thing: &str) -> String {
-    format!("{n} {thing}{}", if n == 1 { "" } else { "s" })
+/// `1 case`, `2 cases`.
+pub(crate) fn counted(n: usize, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
 }
 
 /// A gate that nothing was held against.
@@ -560,19 +560,19 @@ impl Record {
         let s = &self.summary;
         let mut line = format!("{} passed, {} failed, {} inconclusive", s.pass, s.fail, s.inconclusive);
         if s.known_failures > 0 {
-            line += &format!(", {}", counted(s.known_failures, "known failure"));
+            line += &format!(", {}", counted(s.known_failures, "known failure", "known failures"));
         }
         if s.warnings > 0 {
-            line += &format!(", {}", counted(s.warnings, "warning"));
+            line += &format!(", {}", counted(s.warnings, "warning", "warnings"));
         }
         if s.not_run > 0 {
             line += &format!(", {} not run", s.not_run);
         }
         if s.failed_cases > 0 {
-            line += &format!("; {} of {} ended with an error", s.failed_cases, counted(s.cases, "case"));
+            line += &format!("; {} of {} ended with an error", s.failed_cases, counted(s.cases, "case", "cases"));
         }
         if s.failed_judges > 0 {
-            line += &format!("; the judge of {} failed", counted(s.failed_judges, "scene"));
+            line += &format!("; the judge of {} failed", counted(s.failed_judges, "scene", "scenes"));
         }
         line
     }

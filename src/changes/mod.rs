@@ -26,7 +26,7 @@ pub use text::text;
 pub use times::{TimeChange, Times};
 pub use verdicts::{Gates, GoneGate, LimitChange, NewGate, VerdictChange, Withdrawn};
 
-use crate::record::{Record, Summary};
+use crate::record::{Record, Summary, counted};
 use grounds::Grounds;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -214,11 +214,6 @@ impl Changes {
         }
         says.join(", ")
     }
-}
-
-/// `1 case`, `2 cases`.
-fn counted(n: usize, one: &str, many: &str) -> String {
-    format!("{n} {}", if n == 1 { one } else { many })
 }
 
 /// A p-value with the digits that count.

@@ -1,8 +1,9 @@
 //! What changed, as tables of words, before they become text or Markdown.
 
-use super::{Both, Changes, ImageState, Kind, MetricChange, Turn, counted, p_text, place};
+use super::{Both, Changes, ImageState, Kind, MetricChange, Turn, p_text, place};
 use crate::{
     gate::Outcome,
+    record::counted,
     report::table::{digits, outcome_text, value_text},
 };
 

@@ -3,6 +3,7 @@
 
 use super::{Gate, Other};
 use crate::{
+    layers::short_hash,
     metrics::{Absent, Metric, Quantity},
     record::{CaseRecord, Record, SceneRecord, SuiteInfo},
     stats::Estimate,
@@ -100,7 +101,7 @@ impl<'a> Parts<'a> {
             return none(format!("the base record has no scene '{scene}'"));
         };
         if own.hash != old.hash {
-            let [new, old] = [&own.hash, &old.hash].map(|h| h.get(..12).unwrap_or(h));
+            let [new, old] = [&own.hash, &old.hash].map(|h| short_hash(h));
             return none(format!(
                 "scene '{scene}' is not what it was in the base record: its hash is {new}, there {old}; make a new base"
             ));

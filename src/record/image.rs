@@ -3,7 +3,7 @@
 use super::CaseRecord;
 use crate::{
     disk::DiskError,
-    layers::{Layers, pixel_hash},
+    layers::{Layers, pixel_hash, short_hash},
 };
 use std::path::Path;
 
@@ -24,7 +24,7 @@ impl CaseRecord {
         if found == self.hash || self.hash.is_none() {
             return Ok(layers);
         }
-        let short = |hash: &Option<String>| hash.as_deref().map_or("none", |h| h.get(..12).unwrap_or(h)).to_owned();
+        let short = |hash: &Option<String>| hash.as_deref().map_or("none".to_owned(), |h| short_hash(h).to_owned());
         let why = format!(
             "not the image that was measured: the hash of its mean is {}, in the record {}; restore the file, or run again",
             short(&found),

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     disk::{DiskError, read_json, read_text, write_json, write_whole},
-    layers::{Layers, hex},
+    layers::{Layers, hex, short_hash},
     metrics::{
         artifact::Converged,
         regions::{Region, Regions},
@@ -65,9 +65,9 @@ pub struct ReferencesFile {
 }
 
 impl ReferencesFile {
-    /// What a kit is called by, so that another is told from it: the first twelve digits of [`ReferencesFile::sha256`].
+    /// What a kit is called by, so that another is told from it: [`ReferencesFile::sha256`] in short.
     pub fn id(&self) -> &str {
-        self.sha256.get(..12).unwrap_or(&self.sha256)
+        short_hash(&self.sha256)
     }
 
     /// What [`ReferencesFile::sha256`] must be.

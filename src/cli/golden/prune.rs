@@ -41,7 +41,7 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
         pending(store.is_interrupted()?);
     }
     let done = if args.dry_run { "would be removed" } else { "removed" };
-    tell(&format!("{} {done}; {} cases are named", counted(orphans.len(), "golden"), named.len()));
+    tell(&format!("{} {done}; {} cases are named", counted(orphans.len(), "golden", "goldens"), named.len()));
     Ok(Exit::Pass)
 }
 

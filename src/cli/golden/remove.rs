@@ -2,13 +2,13 @@
 
 use super::{Exit, Failure, notice, print, tell};
 use crate::{
+    disk::is_same,
     golden::{Slot, Store},
     record::counted,
 };
 use std::{
     collections::BTreeSet,
     ffi::{OsStr, OsString},
-    fs,
     path::{Path, PathBuf},
 };
 
@@ -44,7 +44,7 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     for slot in &slots {
         print(&format!("{}\n", store.path(slot).display()))?;
     }
-    tell(&format!("{} removed", counted(slots.len(), "golden")));
+    tell(&format!("{} removed", counted(slots.len(), "golden", "goldens")));
     Ok(Exit::Pass)
 }
 
@@ -54,8 +54,7 @@ fn slot(name: &Path, goldens: &Path) -> Result<Slot, Failure> {
         file.push(".exr");
     }
     let folder = name.parent().and_then(Path::parent).unwrap_or(Path::new(""));
-    let is_within = folder.as_os_str().is_empty()
-        || fs::canonicalize(folder).is_ok_and(|a| fs::canonicalize(goldens).is_ok_and(|b| a == b));
+    let is_within = folder.as_os_str().is_empty() || is_same(folder, goldens);
     let slot = Slot::of_path(&parts.iter().rev().collect::<PathBuf>()).filter(|_| is_within);
     slot.ok_or_else(|| {
         Failure::usage(format!(

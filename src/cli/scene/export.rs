@@ -7,6 +7,7 @@ use crate::{
         run::{bar, interrupt},
         tell,
     },
+    disk::is_same,
     judge_cache::JudgeCache,
     kit::{self, KitError},
     record::{Machine, counted},
@@ -14,10 +15,7 @@ use crate::{
     run::{Means, Prepared, Stop},
     suite::{Plan, Platform, Suite},
 };
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 /// Pack scenes for another renderer: glb with and without the occluder, views, G-buffer,
 /// and a page that says what to render. Of a suite also judge, converged images and region maps, so that
@@ -73,13 +71,10 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
 
 /// Refuses to write a scene file over the one that was read: what its author wrote would be gone.
 fn check_own(file: &Path, out: &Path) -> Result<(), Failure> {
-    match (fs::canonicalize(file), fs::canonicalize(out)) {
-        (Ok(file), Ok(there)) if file == there => Err(Failure::usage(format!(
-            "{}: the scene would be written over its own file: name another folder",
-            out.display()
-        ))),
-        _ => Ok(()),
+    if !is_same(file, out) {
+        return Ok(());
     }
+    Err(Failure::usage(format!("{}: the scene would be written over its own file: name another folder", out.display())))
 }
 
 fn of_suite(args: &Args, suite: &str) -> Result<Exit, Failure> {
@@ -93,7 +88,7 @@ fn of_suite(args: &Args, suite: &str) -> Result<Exit, Failure> {
     let means = Means { cache: cache.as_ref(), stop, ..Means::new(&Cpu, machine) };
     kit::write_suite(&prepared, &suite, &means, &args.out, &bar())?;
     let readme = args.out.join("README.md");
-    let scenes = counted(suite.scenes.len(), "scene");
+    let scenes = counted(suite.scenes.len(), "scene", "scenes");
     tell(&format!("{}: {scenes} of suite '{}' are packed; begin here", readme.display(), suite.name));
     Ok(Exit::Pass)
 }

@@ -2,7 +2,7 @@
 
 use super::{
     Finding, Reference,
-    meaning::{DIFFERENT, SURE, factor, left, undone},
+    meaning::{DIFFERENT, SURE, factor, is_as_near, left, undone},
 };
 use std::fmt;
 
@@ -79,7 +79,7 @@ pub fn agreement(image: &[f32], reference: &Reference, size: [usize; 2], found: 
     let mut named: Vec<_> = other.into_iter().chain([gain]).filter(|(_, left)| left[0] < NAMED * without).collect();
     named.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
     let best = named.first().map_or([f64::INFINITY; 2], |(_, left)| *left);
-    named.retain(|(_, left)| left[0] - best[0] < SURE * left[1].hypot(best[1]));
+    named.retain(|(_, left)| is_as_near(*left, best));
     Some(Disagreement { rms, mean, causes: named.into_iter().map(|(cause, _)| cause).collect() })
 }
 

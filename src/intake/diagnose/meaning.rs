@@ -118,8 +118,7 @@ fn has_two_numbers(finding: &Finding) -> bool {
 /// than the noise beyond what the best leaves, or so little that an image without any finding may differ by it.
 fn either(explained: &[Hypothesis], best: &Hypothesis, without: [f64; 2]) -> Finding {
     let fits = |h: &&Hypothesis| {
-        let beyond = h.left[0] - best.left[0];
-        let is_as_near = beyond < SURE * h.left[1].hypot(best.left[1]) || !is_different(h.left);
+        let is_as_near = is_as_near(h.left, best.left) || !is_different(h.left);
         let is_other = h.finding != best.finding && !has_two_numbers(&h.finding);
         is_other && is_as_near && explains_some(h.left, without)
     };
@@ -152,6 +151,11 @@ pub(super) fn explains(left: [f64; 2], without: [f64; 2]) -> bool {
     let error = without[1].hypot(left[1]);
     let is_left = left[0] < LEFT * without[0] + 2.0 * left[1];
     is_left && left[0] + 2.0 * left[1] < CERTAIN * without[0] && without[0] - left[0] > SURE * error
+}
+
+/// Whether a hypothesis leaves no more than the noise beyond what the best one leaves.
+pub(super) fn is_as_near(left: [f64; 2], best: [f64; 2]) -> bool {
+    left[0] - best[0] < SURE * left[1].hypot(best[1])
 }
 
 /// Whether a difference, a mean square with its error, is worth an explanation.

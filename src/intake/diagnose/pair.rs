@@ -3,7 +3,7 @@
 use super::{
     Reference,
     agreement::{NAMED, Radius, radius},
-    meaning::{SURE, explains, factor, is_different, left, proportion},
+    meaning::{SURE, explains, factor, is_as_near, is_different, left, proportion},
 };
 use crate::{
     intake::Curve,
@@ -149,7 +149,7 @@ pub fn pair_causes(pair: &Pair<'_>, reference: &Reference, size: [usize; 2]) -> 
     let Some(best) = explained.iter().map(|e| e.1).reduce(|a, b| if b[0] < a[0] { b } else { a }) else {
         return Some(Vec::new());
     };
-    let fits = |left: [f64; 2]| left[0] - best[0] < SURE * left[1].hypot(best[1]) || !is_different(left);
+    let fits = |left: [f64; 2]| is_as_near(left, best) || !is_different(left);
     let mut all: Vec<_> = explained.into_iter().filter(|(_, left)| fits(*left)).collect();
     all.sort_by(|a, b| a.1[0].total_cmp(&b.1[0]));
     // The sRGB curve is nearly a power: of the two the nearer.

@@ -2,7 +2,7 @@
 
 use crate::{
     gate::{Outcome, Verdict},
-    record::Record,
+    record::{Record, counted},
     report::{errors, in_a_line, table::margin},
     untrusted::{cut, line},
 };
@@ -69,11 +69,15 @@ pub fn annotations(record: &Record) -> Vec<String> {
     all.sort_by_key(|a| a.level);
     if all.len() > MOST_ANNOTATIONS {
         let more = all.split_off(MOST_ANNOTATIONS - 1);
-        let count = |level, one: &str| {
+        let count = |level, one, many| {
             let n = more.iter().filter(|a| a.level == level).count();
-            (n > 0).then(|| format!("{n} {one}{}", if n == 1 { "" } else { "s" }))
+            (n > 0).then(|| counted(n, one, many))
         };
-        let counts = [count(Level::Error, "error"), count(Level::Warning, "warning"), count(Level::Notice, "notice")];
+        let counts = [
+            count(Level::Error, "error", "errors"),
+            count(Level::Warning, "warning", "warnings"),
+            count(Level::Notice, "notice", "notices"),
+        ];
         let counts: Vec<String> = counts.into_iter().flatten().collect();
         let message = format!("{} are in the job's summary and in the report.", counts.join(", "));
         let level = more.first().map_or(Level::Notice, |a| a.level);

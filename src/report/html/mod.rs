@@ -56,7 +56,7 @@ fn page(folder: &Path, record: &Record) -> Result<String, ReportError> {
         summary: format!(
             "{} in {}. {}",
             record.summary_line(),
-            counted(record.summary.cases, "case"),
+            counted(record.summary.cases, "case", "cases"),
             record.suite.description
         ),
         notes: rows::notes(record),

@@ -174,7 +174,11 @@ fn context<'a>(record: &'a Record, gallery: &Gallery, brief: bool) -> Result<Con
         headline,
         sign,
         summary: record.summary_line(),
-        cases: format!("{} of {}", counted(record.summary.cases, "case"), counted(record.scenes.len(), "scene")),
+        cases: format!(
+            "{} of {}",
+            counted(record.summary.cases, "case", "cases"),
+            counted(record.scenes.len(), "scene", "scenes")
+        ),
         replicates: replicates(record),
         handed_in: handed_in::notes(record),
         brief,
