@@ -17,7 +17,7 @@ use glam::Vec3;
 use std::{collections::BTreeMap, sync::Arc};
 
 /// The shader of lit views.
-const SHADER: &str = concat!(
+pub(super) const SHADER: &str = concat!(
     include_str!("shaders/sampler.wgsl"),
     include_str!("shaders/surface.wgsl"),
     include_str!("shaders/ao.wgsl"),

@@ -13,7 +13,7 @@ use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 
 /// The shader, with what it shares with seeing by rays.
-const SHADER: &str = concat!(
+pub(super) const SHADER: &str = concat!(
     include_str!("shaders/sampler.wgsl"),
     include_str!("shaders/surface.wgsl"),
     include_str!("shaders/ao.wgsl"),

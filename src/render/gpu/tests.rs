@@ -1,6 +1,8 @@
 //! Devices that fail: each failure ends one job with a sentence, and the next job
 //! is none the worse for it.
 
+mod translation;
+
 use super::{Checks, GBufferBy, Gpu, Options, Persistent, device::Setup};
 use crate::{
     render::{

@@ -11,14 +11,14 @@ use bytemuck::{Pod, Zeroable};
 use std::time::Instant;
 
 /// Accumulation over frames.
-const TEMPORAL: &str = concat!(
+pub(in crate::render::gpu) const TEMPORAL: &str = concat!(
     include_str!("../shaders/surface.wgsl"),
     include_str!("../shaders/smoothing.wgsl"),
     include_str!("../shaders/temporal.wgsl")
 );
 
 /// The spatial filter.
-const ATROUS: &str = concat!(
+pub(in crate::render::gpu) const ATROUS: &str = concat!(
     include_str!("../shaders/surface.wgsl"),
     include_str!("../shaders/smoothing.wgsl"),
     include_str!("../shaders/atrous.wgsl")

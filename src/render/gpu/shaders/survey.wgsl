@@ -5,9 +5,8 @@
 // the points has nothing near. The CPU has no twin of this: it changes no result.
 // What it saves: docs/gpu.md.
 
-// Which of four slots touch the surroundings, as in `four_met`, but inner nodes in
-// the order of slots.
-fn four_near(s: Surroundings, p: vec3<f32>, size: vec3<f32>, lo: vec3<u32>, hi: vec3<u32>, meta_bytes: u32, inner: u32, first: u32) -> u32 {
+// Which of four slots touch the surroundings.
+fn four_near(s: Surroundings, p: vec3<f32>, size: vec3<f32>, lo: vec3<u32>, hi: vec3<u32>) -> vec4<bool> {
     let start = p - s.origin;
     let lo_x = planes(lo.x, size.x, start.x);
     let hi_x = planes(hi.x, size.x, start.x);
@@ -20,15 +19,10 @@ fn four_near(s: Surroundings, p: vec3<f32>, size: vec3<f32>, lo: vec3<u32>, hi: 
     let z = max(max(lo_z, -hi_z), vec4<f32>());
     let n = s.normal;
     let height = max(lo_x * n.x, hi_x * n.x) + max(lo_y * n.y, hi_y * n.y) + max(lo_z * n.z, hi_z * n.z);
-    let touches = (x * x + y * y + z * z <= vec4<f32>(s.radius * s.radius)) & (height >= vec4<f32>(s.floor_height));
-    let slots = vec4<u32>(0u, 1u, 2u, 3u) + first;
-    let metas = unpack4xU8(meta_bytes);
-    let of_leaf = (metas >> vec4<u32>(5u)) << (metas & vec4<u32>(31u));
-    let is_inner = ((vec4<u32>(inner) >> slots) & vec4<u32>(1u)) == vec4<u32>(1u);
-    let bits = select(vec4<u32>(), select(of_leaf, vec4<u32>(0x1000000u) << slots, is_inner), touches);
-    return bits.x | bits.y | bits.z | bits.w;
+    return (x * x + y * y + z * z <= vec4<f32>(s.radius * s.radius)) & (height >= vec4<f32>(s.floor_height));
 }
 
+// As `children_met`, but inner nodes in the order of slots.
 fn children_near(at: u32, corner_and_steps: vec4<u32>, metas: vec2<u32>, s: Surroundings) -> u32 {
     let p = bitcast<vec3<f32>>(corner_and_steps.xyz);
     let steps = corner_and_steps.w;
@@ -36,9 +30,9 @@ fn children_near(at: u32, corner_and_steps: vec4<u32>, metas: vec2<u32>, s: Surr
     let a = nodes[at + 2u];
     let b = nodes[at + 3u];
     let c = nodes[at + 4u];
-    let inner = steps >> 24u;
-    return four_near(s, p, size, vec3<u32>(a.x, a.z, b.x), vec3<u32>(b.z, c.x, c.z), metas.x, inner, 0u)
-        | four_near(s, p, size, vec3<u32>(a.y, a.w, b.y), vec3<u32>(b.w, c.y, c.w), metas.y, inner, 4u);
+    let first = four_near(s, p, size, vec3<u32>(a.x, a.z, b.x), vec3<u32>(b.z, c.x, c.z));
+    let second = four_near(s, p, size, vec3<u32>(a.y, a.w, b.y), vec3<u32>(b.w, c.y, c.w));
+    return bits_of(first, metas.x, 0u) | bits_of(second, metas.y, 0u);
 }
 
 fn rises(triangle: u32, s: Surroundings) -> bool {

@@ -18,50 +18,60 @@ fn planes(bytes: u32, scale: f32, start: f32) -> vec4<f32> {
     return vec4<f32>(unpack4xU8(bytes)) * scale + start;
 }
 
+// The bits of four slots, those that are met: for an inner node one of the highest
+// eight, which a ray takes in the order of slot xor octant; for a leaf one a triangle.
+// A byte of `metas` has bits 16 and 8 both set for an inner node alone.
+fn bits_of(met: vec4<bool>, metas: u32, octant: u32) -> u32 {
+    let inner = ((metas & (metas << 1u)) >> 4u) & 0x01010101u;
+    let places = unpack4xU8((metas ^ (inner * octant)) & 0x1f1f1f1fu);
+    let ones = unpack4xU8((metas >> 5u) & 0x07070707u);
+    let bits = select(vec4<u32>(), ones << places, met);
+    return bits.x | bits.y | bits.z | bits.w;
+}
+
 // A ray in the grid of a node's boxes.
 struct Gridded {
     scale: vec3<f32>,
     start: vec3<f32>,
     tmax: f32,
-    octant: u32,
 }
 
-// Which of four slots, from `first` on, the ray meets: see `children_met`.
-fn four_met(g: Gridded, lo: vec3<u32>, hi: vec3<u32>, meta_bytes: u32, inner: u32, first: u32) -> u32 {
-    let lo_x = planes(lo.x, g.scale.x, g.start.x);
-    let hi_x = planes(hi.x, g.scale.x, g.start.x);
-    let lo_y = planes(lo.y, g.scale.y, g.start.y);
-    let hi_y = planes(hi.y, g.scale.y, g.start.y);
-    let lo_z = planes(lo.z, g.scale.z, g.start.z);
-    let hi_z = planes(hi.z, g.scale.z, g.start.z);
-    let near = max(max(min(lo_x, hi_x), min(lo_y, hi_y)), max(min(lo_z, hi_z), vec4<f32>()));
-    let far = min(min(max(lo_x, hi_x), max(lo_y, hi_y)), min(max(lo_z, hi_z), vec4<f32>(g.tmax)));
-    let slots = vec4<u32>(0u, 1u, 2u, 3u) + first;
-    let metas = unpack4xU8(meta_bytes);
-    let of_leaf = (metas >> vec4<u32>(5u)) << (metas & vec4<u32>(31u));
-    let of_inner = vec4<u32>(1u) << (24u + (slots ^ vec4<u32>(g.octant)));
-    let is_inner = ((vec4<u32>(inner) >> slots) & vec4<u32>(1u)) == vec4<u32>(1u);
-    let bits = select(vec4<u32>(), select(of_leaf, of_inner, is_inner), near <= far * 1.0000004);
-    return bits.x | bits.y | bits.z | bits.w;
+// Which of four slots the ray meets: where it enters and leaves their boxes, axis by
+// axis, a byte a slot.
+fn four_met(g: Gridded, enters: vec3<u32>, leaves: vec3<u32>) -> vec4<bool> {
+    let near_x = planes(enters.x, g.scale.x, g.start.x);
+    let near_y = planes(enters.y, g.scale.y, g.start.y);
+    let near_z = planes(enters.z, g.scale.z, g.start.z);
+    let far_x = planes(leaves.x, g.scale.x, g.start.x);
+    let far_y = planes(leaves.y, g.scale.y, g.start.y);
+    let far_z = planes(leaves.z, g.scale.z, g.start.z);
+    let near = max(max(near_x, near_y), max(near_z, vec4<f32>()));
+    let far = min(min(far_x, far_y), min(far_z, vec4<f32>(g.tmax)));
+    return near <= far * 1.0000004;
 }
 
-// Which children of a node the ray meets: for an inner node, a bit of the highest
-// eight in the order in which the ray takes them; for a leaf, a bit each triangle.
+// Which children of a node the ray meets, as `bits_of` has them.
 //
 // With q steps of size s from p, a plane lies at p + q s; (p - o) / d + q (s / d) is
 // one operation less for each of 48 planes than (p + q s - o) / d, but rounds at
-// the size of p and o: boxes are padded for that.
+// the size of p and o: boxes are padded for that. The ray's signs tell a box's near
+// planes from its far ones before they are unpacked, four at once.
 fn children_met(at: u32, corner_and_steps: vec4<u32>, metas: vec2<u32>, ray: Ray, octant: u32, tmax: f32) -> u32 {
     let p = bitcast<vec3<f32>>(corner_and_steps.xyz);
     let steps = corner_and_steps.w;
     let size = bitcast<vec3<f32>>((vec3<u32>(steps) >> vec3<u32>(0u, 8u, 16u) & vec3<u32>(0xffu)) << vec3<u32>(23u));
-    let g = Gridded(size * ray.inverse, (p - ray.origin) * ray.inverse, tmax, octant);
+    let g = Gridded(size * ray.inverse, (p - ray.origin) * ray.inverse, tmax);
     let a = nodes[at + 2u];
     let b = nodes[at + 3u];
     let c = nodes[at + 4u];
-    let inner = steps >> 24u;
-    return four_met(g, vec3<u32>(a.x, a.z, b.x), vec3<u32>(b.z, c.x, c.z), metas.x, inner, 0u)
-        | four_met(g, vec3<u32>(a.y, a.w, b.y), vec3<u32>(b.w, c.y, c.w), metas.y, inner, 4u);
+    let lo_a = vec3<u32>(a.x, a.z, b.x);
+    let lo_b = vec3<u32>(a.y, a.w, b.y);
+    let hi_a = vec3<u32>(b.z, c.x, c.z);
+    let hi_b = vec3<u32>(b.w, c.y, c.w);
+    let backwards = ray.direction < vec3<f32>();
+    let first = four_met(g, select(lo_a, hi_a, backwards), select(hi_a, lo_a, backwards));
+    let second = four_met(g, select(lo_b, hi_b, backwards), select(hi_b, lo_b, backwards));
+    return bits_of(first, metas.x, octant) | bits_of(second, metas.y, octant);
 }
 
 // Of two triangles at one distance, the closest hit is the first in the scene,
