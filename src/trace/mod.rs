@@ -82,7 +82,10 @@ pub struct Tracer {
 /// Runs a walk by AVX2 where the machine has it, else by arrays; compiled for each choice of
 /// faces where there is one, so that the loops need not ask.
 macro_rules! by_lanes {
-    ($fast:expr, $module:ident::$walk:ident [$($n:ident)?] $([$fronts:literal])?, ($($arg:ident: $type:ty),*) -> $out:ty) => {{
+    (
+        $fast:expr, $module:ident::$walk:ident [$($n:ident)?] $([$fronts:literal])?,
+        ($($arg:ident: $type:ty),*) -> $out:ty
+    ) => {{
         #[cfg(target_arch = "x86_64")]
         if $fast {
             #[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt")]
