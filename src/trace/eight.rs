@@ -2,7 +2,7 @@
 //! hits is worked out side by side.
 
 use super::{
-    Faces, Hit, Tracer,
+    Hit, Tracer,
     free::Segments,
     lanes::Lanes,
     one,
@@ -56,7 +56,7 @@ pub(super) fn closest<L: Lanes>(tracer: &Tracer, rays: &Segments, mask: u32) -> 
             continue;
         }
         let ray = Ray::new(rays.origins.get(lane), rays.directions.get(lane), rays.tmax[lane]);
-        let Some(met) = one::first::<L>(tracer, &ray, Faces::Both) else { continue };
+        let Some(met) = one::first::<L, false>(tracer, &ray) else { continue };
         let block = &tracer.tree.blocks[met.block as usize];
         for (to, from) in corners.iter_mut().zip(&block.corners) {
             for axis in 0..3 {

@@ -29,20 +29,17 @@ impl Faces {
     pub fn count(self, [a, b, c]: &[Vec3; 3], direction: Vec3) -> bool {
         self == Faces::Both || (*b - *a).cross(*c - *a).dot(direction) < 0.0
     }
+}
 
-    /// Those of a block's triangles in `lanes` that count for a ray: the same, to the bit.
-    /// It is asked of triangles that are met, so that rays which take both sides pay
-    /// nothing for it at those that they miss.
-    #[inline(always)]
-    pub(super) fn among<L: Lanes>(self, block: &Block, lanes: u32, direction: Vec3) -> u32 {
-        if self == Faces::Both {
-            return lanes;
-        }
-        let a = load3::<L>(&block.corners[0]);
-        let normal = exact_cross(sub3(load3(&block.corners[1]), a), sub3(load3(&block.corners[2]), a));
-        // The largest number below 0.
-        lanes & exact_dot(normal, splat3(direction)).le(L::splat(-f32::from_bits(1)))
-    }
+/// Those of a block's triangles in `lanes` that turn their front against a ray: as by
+/// [`Faces::count`], to the bit. It is asked of triangles that are met, because most are
+/// missed.
+#[inline(always)]
+pub(super) fn fronts<L: Lanes>(block: &Block, lanes: u32, direction: Vec3) -> u32 {
+    let a = load3::<L>(&block.corners[0]);
+    let normal = exact_cross(sub3(load3(&block.corners[1]), a), sub3(load3(&block.corners[2]), a));
+    // The largest number below 0.
+    lanes & exact_dot(normal, splat3(direction)).le(L::splat(-f32::from_bits(1)))
 }
 
 #[cfg(test)]

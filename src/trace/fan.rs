@@ -28,6 +28,7 @@
 
 use super::{
     Faces, Ray, Tracer,
+    faces::fronts,
     free::{self, Crossed, Sheared},
     lanes::Lanes,
     tree8::{Block, Node8},
@@ -57,7 +58,7 @@ pub struct Fan {
     pub faces: Faces,
 }
 
-struct Shared<'a, L, const N: usize> {
+struct Shared<'a, L, const N: usize, const FRONTS: bool> {
     tracer: &'a Tracer,
     fan: &'a Fan,
     rays: &'a [Packet; N],
@@ -70,15 +71,20 @@ struct Shared<'a, L, const N: usize> {
 
 /// A bit for each ray of `all` that meets a triangle: lane by lane, packet by packet.
 #[inline(always)]
-pub(super) fn occluded<L: Lanes, const N: usize>(tracer: &Tracer, fan: &Fan, rays: &[Packet; N], all: u32) -> u32 {
+pub(super) fn occluded<L: Lanes, const N: usize, const FRONTS: bool>(
+    tracer: &Tracer,
+    fan: &Fan,
+    rays: &[Packet; N],
+    all: u32,
+) -> u32 {
     // Six operations round.
     let reach = fan.tmax * (1.0 + 1e-5);
     let largest = tracer.magnitude.max(fan.origin.abs().max_element());
-    let shared = Shared {
+    let shared = Shared::<L, N, FRONTS> {
         tracer,
         fan,
         rays,
-        origin: splat3::<L>(fan.origin),
+        origin: splat3(fan.origin),
         normal: splat3(fan.normal),
         behind: L::splat(-(BEHIND[0] * largest + BEHIND[1] * fan.tmax)),
         tmax: L::splat(fan.tmax),
@@ -112,7 +118,7 @@ fn turned<L: Lanes>(n: [L; 3], signs: L) -> [L; 3] {
     [n[0].xor(signs), n[1].xor(signs), n[2].xor(signs)]
 }
 
-impl<L: Lanes, const N: usize> Bundle<L> for Shared<'_, L, N> {
+impl<L: Lanes, const N: usize, const FRONTS: bool> Bundle<L> for Shared<'_, L, N, FRONTS> {
     /// Boxes within tmax of the origin and not wholly behind the plane; all rays come to
     /// those that hold the origin.
     #[inline(always)]
@@ -142,7 +148,7 @@ impl<L: Lanes, const N: usize> Bundle<L> for Shared<'_, L, N> {
             let i = left.trailing_zeros() as usize & 31;
             left &= left - 1;
             let direction = self.rays[if N == 1 { 0 } else { i / 8 % N }].get(i);
-            let (met, unsure) = volumes.meets(block, self.fan.faces, direction, self.tmax);
+            let (met, unsure) = volumes.meets::<FRONTS>(block, direction, self.tmax);
             if met || unsure != 0 && confirm::<L>(self.tracer, block, unsure, self.fan, direction) {
                 closed |= 1 << i;
             }
@@ -213,19 +219,21 @@ impl<L: Lanes> Volumes<L> {
 
     /// Whether a ray surely meets a triangle, and which it may meet.
     #[inline(always)]
-    fn meets(&self, block: &Block, faces: Faces, direction: Vec3, tmax: L) -> (bool, u32) {
+    fn meets<const FRONTS: bool>(&self, block: &Block, direction: Vec3, tmax: L) -> (bool, u32) {
         let d = splat3::<L>(direction);
         let [bc, ca, ab] = self.edges;
         let (u, v, w) = (dot(d, bc), dot(d, ca), dot(d, ab));
         let least = u.min(v).min(w);
         // t = volume / (u + v + w) <= tmax, without the division.
         let bound = u.add(v).add(w).mul(tmax);
-        let mut maybe = L::le2(self.minus_edge, least, self.least, bound) & !self.flat;
-        if maybe != 0 {
-            maybe = faces.among::<L>(block, maybe, direction);
-            if L::le2(self.edge, least, self.most, bound) & maybe != 0 {
-                return (true, 0);
-            }
+        let mut clear = !self.flat;
+        let mut maybe = L::le2(self.minus_edge, least, self.least, bound) & clear;
+        if FRONTS && maybe != 0 {
+            maybe = fronts::<L>(block, maybe, direction);
+            clear = maybe;
+        }
+        if maybe != 0 && L::le2(self.edge, least, self.most, bound) & clear != 0 {
+            return (true, 0);
         }
         if self.flat == 0 {
             return (false, maybe);
@@ -238,7 +246,9 @@ impl<L: Lanes> Volumes<L> {
             let z = main_axis(direction);
             let zero = L::splat(0.0);
             flat &= !if direction[z] > 0.0 { self.hi[z].le(zero) } else { zero.le(self.lo[z]) };
-            flat = faces.among::<L>(block, flat, direction);
+            if FRONTS {
+                flat = fronts::<L>(block, flat, direction);
+            }
         }
         (false, maybe | flat)
     }

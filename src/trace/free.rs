@@ -5,6 +5,7 @@
 
 use super::{
     Faces, Ray, Tracer,
+    faces::fronts,
     lanes::Lanes,
     tree8::{Block, Node8},
     triangle::main_axis,
@@ -199,22 +200,20 @@ fn largest<L: Lanes>(v: [L; 3]) -> L {
     v[0].abs().max(v[1].abs()).max(v[2].abs())
 }
 
-struct Own<'a, L, const N: usize> {
+struct Own<'a, L, const N: usize, const FRONTS: bool> {
     tracer: &'a Tracer,
     segments: &'a [Segments; N],
     slopes: &'a [Slopes; N],
-    faces: Faces,
     lo: [L; 3],
     hi: [L; 3],
 }
 
 /// A bit for each segment of `all` that meets a triangle.
 #[inline(always)]
-pub(super) fn occluded<L: Lanes, const N: usize>(
+pub(super) fn occluded<L: Lanes, const N: usize, const FRONTS: bool>(
     tracer: &Tracer,
     segments: &[Segments; N],
     all: u32,
-    faces: Faces,
 ) -> u32 {
     let mut slopes = [Slopes([[0.0; 8]; 7]); N];
     let (mut lo, mut hi) = ([L::splat(f32::INFINITY); 3], [L::splat(f32::NEG_INFINITY); 3]);
@@ -228,18 +227,17 @@ pub(super) fn occluded<L: Lanes, const N: usize>(
         }
     }
     // The ends err by less than the boxes' padding.
-    let own = Own {
+    let own = Own::<L, N, FRONTS> {
         tracer,
         segments,
         slopes: &slopes,
-        faces,
         lo: [lo[0].least(), lo[1].least(), lo[2].least()],
         hi: [hi[0].greatest(), hi[1].greatest(), hi[2].greatest()],
     };
     any_hit::<L, _, N>(&tracer.tree, &own, &slopes, all)
 }
 
-impl<L: Lanes, const N: usize> Bundle<L> for Own<'_, L, N> {
+impl<L: Lanes, const N: usize, const FRONTS: bool> Bundle<L> for Own<'_, L, N, FRONTS> {
     /// Boxes that overlap the box of all.
     #[inline(always)]
     fn near(&self, node: &Node8) -> (u32, u32) {
@@ -266,12 +264,12 @@ impl<L: Lanes, const N: usize> Bundle<L> for Own<'_, L, N> {
             let direction = s.directions.get(lane);
             let ray = Sheared::new(s.origins.get(lane), direction, inverse);
             let tmax = s.tmax[lane];
-            let Crossed { mut met, sure, .. } = meets::<L>(&ray, block, tmax, tmax);
-            if met == 0 {
-                continue;
+            let Crossed { mut met, mut sure, .. } = meets::<L>(&ray, block, tmax, tmax);
+            if FRONTS && met != 0 {
+                met = fronts::<L>(block, met, direction);
+                sure &= met;
             }
-            met = self.faces.among::<L>(block, met, direction);
-            if sure & met != 0 {
+            if sure != 0 {
                 closed |= 1 << i;
             } else if met != 0 {
                 let ray = Ray::new(s.origins.get(lane), direction, tmax);

@@ -79,21 +79,31 @@ pub struct Tracer {
     fast: bool,
 }
 
-/// Runs a walk by AVX2 where the machine has it, else by arrays.
+/// Runs a walk by AVX2 where the machine has it, else by arrays; compiled for each choice of
+/// faces where there is one, so that the loops need not ask.
 macro_rules! by_lanes {
-    ($fast:expr, $module:ident::$walk:ident [$($n:ident)?], ($($arg:ident: $type:ty),*) -> $out:ty) => {{
+    (
+        $fast:expr, $module:ident::$walk:ident [$($n:ident)?] $([$fronts:literal])?,
+        ($($arg:ident: $type:ty),*) -> $out:ty
+    ) => {{
         #[cfg(target_arch = "x86_64")]
         if $fast {
             #[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt")]
             fn wide $(<const $n: usize>)? ($($arg: $type),*) -> $out {
-                $module::$walk::<lanes::Avx2 $(, $n)?>($($arg),*)
+                $module::$walk::<lanes::Avx2 $(, $n)? $(, $fronts)?>($($arg),*)
             }
             // SAFETY: `fast` is `has_avx2()` or false, and that asks for all of these.
             // Tested against the portable walks by `every_answer_is_the_scalar_walks`.
             return unsafe { wide($($arg),*) };
         }
-        $module::$walk::<lanes::Plain $(, $n)?>($($arg),*)
+        $module::$walk::<lanes::Plain $(, $n)? $(, $fronts)?>($($arg),*)
     }};
+    ($fast:expr, $faces:expr, $module:ident::$walk:ident [$($n:ident)?], $types:tt -> $out:ty) => {
+        match $faces {
+            Faces::Both => by_lanes!($fast, $module::$walk [$($n)?] [false], $types -> $out),
+            Faces::Front => by_lanes!($fast, $module::$walk [$($n)?] [true], $types -> $out),
+        }
+    };
 }
 
 impl Tracer {
@@ -169,6 +179,7 @@ impl Tracer {
         let tracer = self;
         by_lanes!(
             self.fast,
+            fan.faces,
             fan::occluded[N],
             (tracer: &Tracer, fan: &Fan, rays: &[Packet; N], mask: u32) -> u32
         )
@@ -182,8 +193,9 @@ impl Tracer {
         let tracer = self;
         by_lanes!(
             self.fast,
+            faces,
             free::occluded[N],
-            (tracer: &Tracer, segments: &[Segments; N], mask: u32, faces: Faces) -> u32
+            (tracer: &Tracer, segments: &[Segments; N], mask: u32) -> u32
         )
     }
 
@@ -196,7 +208,7 @@ impl Tracer {
     #[inline]
     pub fn occluded_by(&self, ray: &Ray, faces: Faces) -> bool {
         let tracer = self;
-        by_lanes!(self.fast, one::any[], (tracer: &Tracer, ray: &Ray, faces: Faces) -> bool)
+        by_lanes!(self.fast, faces, one::any[], (tracer: &Tracer, ray: &Ray) -> bool)
     }
 
     /// Distance along the ray, within `(0, tmax]`, to the nearest triangle that turns
@@ -222,7 +234,7 @@ impl Tracer {
     #[inline]
     fn first(&self, ray: &Ray, faces: Faces) -> Option<one::Met> {
         let tracer = self;
-        by_lanes!(self.fast, one::first[], (tracer: &Tracer, ray: &Ray, faces: Faces) -> Option<one::Met>)
+        by_lanes!(self.fast, faces, one::first[], (tracer: &Tracer, ray: &Ray) -> Option<one::Met>)
     }
 
     /// What is known of a hit on a triangle, by its barycentric weights.

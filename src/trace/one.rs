@@ -2,7 +2,8 @@
 //! closest hit, or any.
 
 use super::{
-    Faces, Tracer,
+    Tracer,
+    faces::fronts,
     free::{Crossed, Sheared, meets},
     lanes::{Lanes, Plain},
     tree8::{LEAF, Node8},
@@ -32,16 +33,16 @@ impl Met {
     }
 }
 
-/// The nearest triangle on a ray of those that turn such a face against it, of several at
-/// one distance the first in the scene.
+/// The nearest triangle on a ray, of both faces or of `FRONTS` alone; of several at one
+/// distance the first in the scene.
 ///
 /// Whether the scalar walk comes to its leaf is asked of the nearest alone: where it does,
 /// no triangle that it does not come to was nearer. Where it does not, which is rare beyond
 /// measure, it is asked of every triangle that is met.
 #[inline(always)]
-pub(super) fn first<L: Lanes>(tracer: &Tracer, ray: &Ray, faces: Faces) -> Option<Met> {
-    let (met, sure) = nearest::<L, false>(tracer, ray, faces)?;
-    if sure || tracer.comes_to(ray, met.triangle(tracer)) { Some(met) } else { first_with_care(tracer, ray, faces) }
+pub(super) fn first<L: Lanes, const FRONTS: bool>(tracer: &Tracer, ray: &Ray) -> Option<Met> {
+    let (met, sure) = nearest::<L, FRONTS, false>(tracer, ray)?;
+    if sure || tracer.comes_to(ray, met.triangle(tracer)) { Some(met) } else { first_with_care::<FRONTS>(tracer, ray) }
 }
 
 #[cfg(test)]
@@ -52,16 +53,16 @@ thread_local! {
 
 #[cold]
 #[inline(never)]
-fn first_with_care(tracer: &Tracer, ray: &Ray, faces: Faces) -> Option<Met> {
+fn first_with_care<const FRONTS: bool>(tracer: &Tracer, ray: &Ray) -> Option<Met> {
     #[cfg(test)]
     WITH_CARE.with(|count| count.set(count.get() + 1));
-    nearest::<Plain, true>(tracer, ray, faces).map(|(met, _)| met)
+    nearest::<Plain, FRONTS, true>(tracer, ray).map(|(met, _)| met)
 }
 
 /// The nearest triangle, and whether it is met without rounding, too; with `CARE`, of those
 /// that the scalar walk comes to.
 #[inline(always)]
-fn nearest<L: Lanes, const CARE: bool>(tracer: &Tracer, ray: &Ray, faces: Faces) -> Option<(Met, bool)> {
+fn nearest<L: Lanes, const FRONTS: bool, const CARE: bool>(tracer: &Tracer, ray: &Ray) -> Option<(Met, bool)> {
     let Tracer { tree, source, .. } = tracer;
     let sheared = Sheared { origin: ray.origin, axes: ray.axes, shear: ray.shear };
     let mut walk = Walk::<L>::new(tracer, ray)?;
@@ -73,7 +74,9 @@ fn nearest<L: Lanes, const CARE: bool>(tracer: &Tracer, ray: &Ray, faces: Faces)
         if met == 0 {
             continue;
         }
-        met = faces.among::<L>(block, met, ray.direction);
+        if FRONTS {
+            met = fronts::<L>(block, met, ray.direction);
+        }
         let mut distances = [0.0; 8];
         t.store(&mut distances);
         let mut is_changed = false;
@@ -105,19 +108,19 @@ fn nearest<L: Lanes, const CARE: bool>(tracer: &Tracer, ray: &Ray, faces: Faces)
     Some((Met { t: walk.tmax, block, lane, weights }, are_sure >> lane & 1 == 1))
 }
 
-/// Whether a ray meets any triangle that turns such a face against it.
+/// Whether a ray meets any triangle, of both faces or of `FRONTS` alone.
 #[inline(always)]
-pub(super) fn any<L: Lanes>(tracer: &Tracer, ray: &Ray, faces: Faces) -> bool {
+pub(super) fn any<L: Lanes, const FRONTS: bool>(tracer: &Tracer, ray: &Ray) -> bool {
     let sheared = Sheared { origin: ray.origin, axes: ray.axes, shear: ray.shear };
     let Some(mut walk) = Walk::<L>::new(tracer, ray) else { return false };
     while let Some(block) = walk.next_leaf::<false>(tracer) {
         let block = &tracer.tree.blocks[block as usize];
-        let Crossed { mut met, sure, .. } = meets::<L>(&sheared, block, ray.tmax, ray.tmax);
-        if met == 0 {
-            continue;
+        let Crossed { mut met, mut sure, .. } = meets::<L>(&sheared, block, ray.tmax, ray.tmax);
+        if FRONTS && met != 0 {
+            met = fronts::<L>(block, met, ray.direction);
+            sure &= met;
         }
-        met = faces.among::<L>(block, met, ray.direction);
-        if sure & met != 0 || met != 0 && tracer.comes_to_any(block, met, ray) {
+        if sure != 0 || met != 0 && tracer.comes_to_any(block, met, ray) {
             return true;
         }
     }
@@ -247,7 +250,7 @@ mod tests {
     use super::*;
     use crate::{
         render::sampler::Sampler,
-        trace::{Hit, Queue, Segments},
+        trace::{Faces, Hit, Queue, Segments},
     };
 
     /// Small triangles in one place, before and within a large box.
