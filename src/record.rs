@@ -20,6 +20,7 @@ pub use source::{HandedIn, Intervals, Shows, Source, UndoneCurve, told_once};
 pub use until_sure::{Budget, Undecided, UntilSure};
 
 use crate::{
+    counted::counted,
     disk::{DiskError, is_zip, read_text},
     gate::{Gate, Outcome, Verdict},
     metrics::{Metric, artifact::Brighter, convergence::Convergence, profile::Curve, regions::Region},
@@ -206,11 +207,6 @@ impl Summary {
             failed_judges: scenes.iter().filter(|s| s.judge_error.is_some()).count(),
         }
     }
-}
-
-/// `1 case`, `2 cases`.
-pub(crate) fn counted(n: usize, one: &str, many: &str) -> String {
-    format!("{n} {}", if n == 1 { one } else { many })
 }
 
 /// A gate that nothing was held against.
@@ -466,8 +462,9 @@ impl Record {
     /// Reads a record folder. Its summary is counted anew.
     ///
     /// # Errors
-    /// Where `record.json` is missing (the run did not finish), malformed, or of
-    /// a version that is neither [`VERSION`] nor one since [`OLDEST`].
+    /// Where `record.json` is missing (the run did not finish), malformed, of
+    /// a version that is neither [`VERSION`] nor one since [`OLDEST`], or holds a name, a path or a number that no
+    /// run writes.
     pub fn read(folder: &Path) -> Result<Self, DiskError> {
         let path = folder.join(FILE);
         if !path.exists() {

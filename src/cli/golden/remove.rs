@@ -2,9 +2,9 @@
 
 use super::{Exit, Failure, notice, print, tell};
 use crate::{
+    counted::counted,
     disk::is_same,
     golden::{Slot, Store},
-    record::counted,
 };
 use std::{
     collections::BTreeSet,
@@ -34,9 +34,11 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     let missing = store.remove(&slots, &notice)?;
     if let Some(first) = missing.first() {
         let message = format!(
-            "{} of {} goldens do not exist, the first is {}; nothing is removed",
-            missing.len(),
-            slots.len(),
+            "{} not exist, the first is {}; nothing is removed",
+            match (missing.len(), slots.len()) {
+                (1, 1) => "the golden does".to_owned(),
+                (n, all) => format!("{n} of {all} goldens {}", if n == 1 { "does" } else { "do" }),
+            },
             store.path(first).display()
         );
         return Err(Failure { exit: Exit::Golden, message });
