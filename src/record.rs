@@ -9,6 +9,7 @@ mod end;
 mod folder;
 mod image;
 pub mod pictures;
+mod ranges;
 mod source;
 mod until_sure;
 mod version;
@@ -481,7 +482,7 @@ impl Record {
         }
         let text = read_text(&path)?;
         let record = version::parse(&text).map_err(|e| DiskError::content(&path, e))?;
-        record.check_names().map_err(|e| DiskError::content(&path, e))?;
+        record.check_names().and_then(|()| ranges::check(&record)).map_err(|e| DiskError::content(&path, e))?;
         // It may have been edited: what it holds counts, not what it says of itself.
         let summary = Summary::new(&record.verdicts, &record.idle_gates, &record.scenes, &record.cases);
         Ok(Record { summary, ..record })
