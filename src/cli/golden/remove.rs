@@ -33,14 +33,14 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
         args.names.iter().map(|name| slot(name, &args.goldens)).collect::<Result<_, Failure>>()?;
     let missing = store.remove(&slots, &notice)?;
     if let Some(first) = missing.first() {
-        let message = format!(
-            "{} not exist, the first is {}; nothing is removed",
-            match (missing.len(), slots.len()) {
-                (1, 1) => "the golden does".to_owned(),
-                (n, all) => format!("{n} of {all} goldens {}", if n == 1 { "does" } else { "do" }),
-            },
-            store.path(first).display()
-        );
+        let path = store.path(first).display().to_string();
+        let message = match (missing.len(), slots.len()) {
+            (_, 1) => format!("there is no {path}; nothing is removed"),
+            (n, all) => {
+                let do_not = if n == 1 { "does not" } else { "do not" };
+                format!("{n} of {all} goldens {do_not} exist, the first is {path}; nothing is removed")
+            }
+        };
         return Err(Failure { exit: Exit::Golden, message });
     }
     for slot in &slots {
