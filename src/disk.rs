@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::{
     fs,
-    io::{self, BufWriter, Write},
+    io::{self, BufWriter, Read, Write},
     path::{Path, PathBuf},
 };
 
@@ -69,12 +69,54 @@ pub fn write_whole(
     Ok(())
 }
 
-/// How the temporary names of [`write_whole`] begin and end.
+/// How temporary names begin and end.
 const PART: [&str; 2] = [".aogauge-", ".part"];
+
+/// A folder within another for what is moved there once all of it is written; it goes when it is dropped.
+///
+/// # Errors
+/// Where it cannot be made.
+pub(crate) fn part_folder(folder: &Path) -> Result<tempfile::TempDir, DiskError> {
+    let made = tempfile::Builder::new().prefix(PART[0]).suffix(PART[1]).tempdir_in(folder);
+    made.map_err(DiskError::io(folder, "write into the folder"))
+}
 
 /// Whether a file is one that [`write_whole`] was writing when it was killed.
 pub fn is_part(name: &str) -> bool {
     name.starts_with(PART[0]) && name.ends_with(PART[1])
+}
+
+/// Of a file that a command may have written, where its marks must stand: so many bytes from its beginning.
+const MARKED: u64 = 1 << 16;
+
+/// Refuses to write over what others wrote, under names that a command chose itself: files or folders of `names`
+/// may be in the folder only where its file `page` is one that `by` wrote, whose beginning holds all of `marks`.
+/// `by` is such as "report of aogauge".
+///
+/// # Errors
+/// Where one is there and `page` is not such a file; the message says that nothing is written.
+pub(crate) fn refuse_foreign<Name: AsRef<str>>(
+    folder: &Path,
+    page: &str,
+    marks: &[&str],
+    names: impl IntoIterator<Item = Name>,
+    by: &str,
+) -> Result<(), DiskError> {
+    let mut text = Vec::new();
+    let read = fs::File::open(folder.join(page)).and_then(|file| file.take(MARKED).read_to_end(&mut text));
+    let text = String::from_utf8_lossy(&text);
+    if read.is_ok() && marks.iter().all(|mark| text.contains(mark)) {
+        return Ok(());
+    }
+    // A link that leads nowhere is somebody's too.
+    let there = |path: &PathBuf| fs::symlink_metadata(path).is_ok();
+    match names.into_iter().map(|name| folder.join(name.as_ref())).find(there) {
+        Some(path) => {
+            let why = format!("no {by} wrote this: name another folder; nothing is written");
+            Err(DiskError::content(&path, why))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Whether two paths lead to the same file or folder, links followed; not where one leads nowhere.

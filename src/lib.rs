@@ -5,6 +5,7 @@ pub mod changes;
 mod claim;
 pub mod cli;
 pub mod compare;
+mod counted;
 pub mod disk;
 pub mod flatland;
 pub mod gate;

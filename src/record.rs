@@ -9,6 +9,7 @@ mod end;
 mod folder;
 mod image;
 pub mod pictures;
+mod ranges;
 mod source;
 mod until_sure;
 mod version;
@@ -20,6 +21,7 @@ pub use source::{HandedIn, Intervals, Shows, Source, UndoneCurve, told_once};
 pub use until_sure::{Budget, Undecided, UntilSure};
 
 use crate::{
+    counted::counted,
     disk::{DiskError, is_zip, read_text},
     gate::{Gate, Outcome, Verdict},
     metrics::{Metric, artifact::Brighter, convergence::Convergence, profile::Curve, regions::Region},
@@ -206,11 +208,6 @@ impl Summary {
             failed_judges: scenes.iter().filter(|s| s.judge_error.is_some()).count(),
         }
     }
-}
-
-/// `1 case`, `2 cases`.
-pub(crate) fn counted(n: usize, one: &str, many: &str) -> String {
-    format!("{n} {}", if n == 1 { one } else { many })
 }
 
 /// A gate that nothing was held against.
@@ -466,8 +463,9 @@ impl Record {
     /// Reads a record folder. Its summary is counted anew.
     ///
     /// # Errors
-    /// Where `record.json` is missing (the run did not finish), malformed, or of
-    /// a version that is neither [`VERSION`] nor one since [`OLDEST`].
+    /// Where `record.json` is missing (the run did not finish), malformed, of
+    /// a version that is neither [`VERSION`] nor one since [`OLDEST`], or holds a name, a path or a number that no
+    /// run writes.
     pub fn read(folder: &Path) -> Result<Self, DiskError> {
         let path = folder.join(FILE);
         if !path.exists() {
@@ -484,7 +482,7 @@ impl Record {
         }
         let text = read_text(&path)?;
         let record = version::parse(&text).map_err(|e| DiskError::content(&path, e))?;
-        record.check_names().map_err(|e| DiskError::content(&path, e))?;
+        record.check_names().and_then(|()| ranges::check(&record)).map_err(|e| DiskError::content(&path, e))?;
         // It may have been edited: what it holds counts, not what it says of itself.
         let summary = Summary::new(&record.verdicts, &record.idle_gates, &record.scenes, &record.cases);
         Ok(Record { summary, ..record })

@@ -6,6 +6,7 @@ use super::{
     grounds::Grounds,
 };
 use crate::{
+    counted::counted,
     disk::DiskError,
     golden::{ALPHA, Comparison, Limits, Moved, Terms, compare, regions, sampled},
     layers::Layers,
@@ -144,14 +145,16 @@ fn p_of(moved: &Moved) -> Option<f64> {
 fn words(moved: &Moved) -> String {
     match moved {
         Moved::NotANumber { pixels, first: [x, y] } => {
-            format!("{pixels} pixels became no number, the first at {x}, {y}")
+            format!("{} became no number, the first at {x}, {y}", counted(*pixels, "pixel", "pixels"))
         }
         Moved::Structure { pixels, first: [x, y] } => {
-            format!("{pixels} pixels hold a number that held none, the first at {x}, {y}")
+            let hold = counted(*pixels, "pixel holds", "pixels hold");
+            format!("{hold} a number that held none, the first at {x}, {y}")
         }
         Moved::Rays { share, pixels, place: [x, y, w, h], .. } => {
             let share = 100.0 * share;
-            format!("{share:.3} % of rays or more decided differently; {pixels} pixels in {x}, {y} ({w} x {h})")
+            let pixels = counted(*pixels, "pixel", "pixels");
+            format!("{share:.3} % of rays or more decided differently; {pixels} in {x}, {y} ({w} x {h})")
         }
         Moved::Shift { places, regions, .. } => {
             let kind = if places.first().is_some_and(|d| d.bias > 0.0) { "brighter" } else { "darker" };
@@ -164,7 +167,9 @@ fn words(moved: &Moved) -> String {
                 .map_or_else(String::new, |r| format!(", most in region {}: {:+.4}", r.region.label(), r.bias));
             format!("{kind}{at}{most}")
         }
-        Moved::Pattern { rejected, .. } => format!("fine structure moved, no tile did: {rejected} pixels reject"),
+        Moved::Pattern { rejected, .. } => {
+            format!("fine structure moved, no tile did: {}", counted(*rejected, "pixel rejects", "pixels reject"))
+        }
         Moved::Noise(noise) => {
             let kind = if noise.ratio > 1.0 { "noisier" } else { "less noisy" };
             format!("{kind}: {:.3} times the variance", noise.ratio)

@@ -26,7 +26,10 @@ pub use text::text;
 pub use times::{TimeChange, Times};
 pub use verdicts::{Gates, GoneGate, LimitChange, NewGate, VerdictChange, Withdrawn};
 
-use crate::record::{Record, Summary, counted};
+use crate::{
+    counted::counted,
+    record::{Record, Summary},
+};
 use grounds::Grounds;
 use schemars::JsonSchema;
 use serde::Serialize;

@@ -2,8 +2,8 @@
 
 use super::{Both, Changes, ImageState, Kind, MetricChange, Turn, p_text, place};
 use crate::{
+    counted::counted,
     gate::Outcome,
-    record::counted,
     report::table::{digits, outcome_text, value_text},
 };
 

@@ -5,7 +5,7 @@ mod cpu;
 use super::{Exit, Failure, Format, json, on_gpu::OnGpu, print, run::bar, scene::load, tell};
 use crate::{
     bench::{GpuBench, MOST_RAYS, Settings, VERSION, scene},
-    disk::write_whole,
+    disk::{refuse_foreign, write_whole},
     render::gpu::{Gpu, Rounds},
     report::bench as tables,
     run::Observer,
@@ -50,13 +50,17 @@ pub struct GpuArgs {
     seed: u32,
     #[command(flatten)]
     on_gpu: OnGpu,
-    /// Folder for bench.json and bench.md.
+    /// Folder for bench.json and bench.md; no file of others is replaced.
     #[arg(long)]
     out: Option<PathBuf>,
     /// What is printed on standard output.
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
+
+/// The files in a folder.
+const NUMBERS: &str = "bench.json";
+const PAGE: &str = "bench.md";
 
 /// The largest side of a view.
 const LARGEST: u32 = 8192;
@@ -77,6 +81,7 @@ pub fn execute(verb: &Verb) -> Result<Exit, Failure> {
 }
 
 fn gpu(args: &GpuArgs) -> Result<Exit, Failure> {
+    check_out(args.out.as_deref(), tables::TITLE, "adapter")?;
     let scenes = args.scenes.iter().map(|name| load(name)).collect::<Result<Vec<_>, _>>()?;
     let gpu = Gpu::with(args.on_gpu.options()).map_err(|e| Failure::usage(e.to_string()))?;
     let usual = |hardware, software| if gpu.is_software() { software } else { hardware };
@@ -119,10 +124,18 @@ fn gpu(args: &GpuArgs) -> Result<Exit, Failure> {
     failed.map_or(Ok(Exit::Pass), Err)
 }
 
+/// Each file may replace one of the same kind alone, of which its page has the `title` and its numbers the `field`.
+fn check_out(folder: Option<&Path>, title: &str, field: &str) -> Result<(), Failure> {
+    let Some(folder) = folder else { return Ok(()) };
+    let by = format!("bench of '{title}'");
+    refuse_foreign(folder, PAGE, &[&format!("# {title}\n")], [PAGE], &by)?;
+    Ok(refuse_foreign(folder, NUMBERS, &["\"tool\": ", &format!("\"{field}\": ")], [NUMBERS], &by)?)
+}
+
 /// Writes what was measured to a folder, where one is given, and prints it; of texts the page's, then the terminal's.
 fn hand_out(folder: Option<&Path>, format: Format, json: &str, [page, plain]: [String; 2]) -> Result<(), Failure> {
     if let Some(folder) = folder {
-        for (name, text) in [("bench.json", json), ("bench.md", &page)] {
+        for (name, text) in [(NUMBERS, json), (PAGE, &page)] {
             let path = folder.join(name);
             write_whole(&path, |buffer| buffer.write_all(text.as_bytes()))?;
             tell(&path.display().to_string());

@@ -7,6 +7,7 @@ use super::{
     tell,
 };
 use crate::{
+    counted::counted,
     layers::{Layers, write_png},
     picture::{split, tone},
     render::{
@@ -249,13 +250,13 @@ fn told(composed: &Composed, format: Format) -> Result<Exit, Failure> {
         Format::Text => {
             let names: Vec<&str> = composed.pictures.iter().map(|p| p.name.as_str()).collect();
             tell(&format!(
-                "{}: {}, {} x {} pixels, {} rays and {} samples a pixel, exposure {:.2} EV, AO {:.2} s",
+                "{}: {}, {} x {} pixels, {} and {} a pixel, exposure {:.2} EV, AO {:.2} s",
                 composed.image,
                 names.join(" | "),
                 composed.resolution[0],
                 composed.resolution[1],
-                composed.rays,
-                composed.samples,
+                counted(composed.rays, "ray", "rays"),
+                counted(composed.samples, "sample", "samples"),
                 composed.exposure,
                 composed.seconds
             ));

@@ -2,6 +2,7 @@
 
 use super::{Exit, Failure, Format, json, print};
 use crate::{
+    counted::counted,
     judge_cache::{self, JudgeCache},
     record::cpu_name,
     render::{
@@ -119,7 +120,7 @@ impl Findings {
         }
         let features =
             if self.cpu_features.is_empty() { String::new() } else { format!(", {}", self.cpu_features.join(", ")) };
-        page.entry("CPU", &format!("{}, {} threads{features}", self.cpu, self.threads));
+        page.entry("CPU", &format!("{}, {}{features}", self.cpu, counted(self.threads, "thread", "threads")));
         let cache = self.judge_cache.as_ref().map_or_else(
             || "no folder of the user's for it: the judge is traced anew in every run".to_owned(),
             |c| {

@@ -76,7 +76,10 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     }
     print(&match args.format {
         Format::Json => json(&Explanations { version: VERSION, explanations })?,
-        Format::Text if explanations.is_empty() => format!("All {} verdicts passed.\n", record.verdicts.len()),
+        Format::Text if explanations.is_empty() => match record.verdicts.len() {
+            1 => "The one verdict passed.\n".to_owned(),
+            n => format!("All {n} verdicts passed.\n"),
+        },
         Format::Text => explanations.iter().map(Explanation::plain).collect::<Vec<_>>().join("\n"),
     })?;
     Ok(Exit::Pass)

@@ -2,7 +2,7 @@
 
 use super::{Exit, Failure, Format, json, print, run::bar, tell};
 use crate::{
-    disk::write_whole,
+    disk::{refuse_foreign, write_whole},
     flatland::{Estimator, Measure, ReceiverPlane, Setting, Space},
     report::flatland as plots,
     run::Observer,
@@ -56,7 +56,7 @@ pub struct Args {
     /// Map highlight contrast over w/R and m/R too.
     #[arg(long)]
     map: bool,
-    /// Folder for flatland.json, profiles.svg and, with --map, map.svg.
+    /// Folder for flatland.json, profiles.svg and, with --map, map.svg; no file of others is replaced.
     #[arg(long)]
     out: Option<PathBuf>,
     /// How results are printed.
@@ -96,6 +96,11 @@ const SHORTEST: f64 = 1e-6;
 /// The longest list: each value is a panel or a curve of the plot.
 const MOST: usize = 8;
 
+/// The files in the folder.
+const PROFILES: &str = "profiles.svg";
+const MAP: &str = "map.svg";
+const NUMBERS: &str = "flatland.json";
+
 fn length(option: &str, value: f64) -> Result<f64, Failure> {
     if (SHORTEST..=LONGEST).contains(&value) {
         return Ok(value);
@@ -114,6 +119,14 @@ fn lengths(option: &str, values: &[f64]) -> Result<Vec<f64>, Failure> {
 }
 
 impl Args {
+    /// Each file may replace one of its own kind alone.
+    fn check_out(&self) -> Result<(), Failure> {
+        let Some(out) = &self.out else { return Ok(()) };
+        let files = [(PROFILES, plots::PROFILES_BEGIN), (MAP, plots::MAP_BEGINS), (NUMBERS, "{\n  \"setting\": {")];
+        let mut written = files.into_iter().filter(|(name, _)| self.map || *name != MAP);
+        Ok(written.try_for_each(|(name, mark)| refuse_foreign(out, name, &[mark], [name], "study of flatland"))?)
+    }
+
     fn estimators(&self, radius: f64) -> Result<Vec<Estimator>, Failure> {
         let exponential = self.falloff == Falloff::Exponential;
         for (option, given, meant_for_exponential) in [
@@ -159,7 +172,9 @@ impl Args {
 }
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
-    let mut study = args.setting()?.study();
+    let setting = args.setting()?;
+    args.check_out()?;
+    let mut study = setting.study();
     if args.map {
         let bar = bar();
         study.map = Some(study.setting.map(&|done, total| bar.step(done as u64, total as u64, "boxes of the map")));
@@ -167,12 +182,12 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     let document = json(&study)?;
     if let Some(out) = &args.out {
         let unplotted = |e| Failure::usage(format!("the plot cannot be drawn: {e}"));
-        let mut files = vec![("profiles.svg", plots::profiles(&study).map_err(unplotted)?)];
+        let mut files = vec![(PROFILES, plots::profiles(&study).map_err(unplotted)?)];
         if let Some(map) = &study.map {
-            files.push(("map.svg", plots::map(&study.setting, map).map_err(unplotted)?));
+            files.push((MAP, plots::map(&study.setting, map).map_err(unplotted)?));
         }
         // Last, so that where it is, the plots are.
-        files.push(("flatland.json", document.clone()));
+        files.push((NUMBERS, document.clone()));
         for (name, text) in files {
             let path = out.join(name);
             write_whole(&path, |file| file.write_all(text.as_bytes()))?;

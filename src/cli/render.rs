@@ -2,6 +2,7 @@
 
 use super::{Exit, Failure, Format, json, on_gpu::OnGpu, print, scene::load, tell};
 use crate::{
+    counted::counted,
     layers::Layers,
     metrics::regions::Regions,
     render::{
@@ -145,12 +146,12 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     match args.format {
         Format::Json => print(&json(&rendered)?)?,
         Format::Text => tell(&format!(
-            "{}: {} x {} pixels, {} x {} rays, {:.2} s, mean {:.4}",
+            "{}: {} x {} pixels, {} x {}, {:.2} s, mean {:.4}",
             rendered.image,
             rendered.resolution[0],
             rendered.resolution[1],
             rendered.replicates,
-            rays,
+            counted(rays, "ray", "rays"),
             rendered.seconds,
             rendered.mean
         )),

@@ -2,6 +2,7 @@
 
 use super::{Exit, Failure, Format as Printed, json, print, tell};
 use crate::{
+    disk::is_same,
     record::Record,
     report::{
         self, Format,
@@ -30,7 +31,7 @@ pub struct Args {
     /// What to make, one or several.
     #[arg(long, value_enum, value_delimiter = ',', default_value = "markdown")]
     format: Vec<Format>,
-    /// Folder for the files; the record's unless given.
+    /// Folder for the files; the record's unless given. Nothing in it is replaced but earlier reports.
     #[arg(long)]
     out: Option<PathBuf>,
     /// Where the record's folder can be seen on the web: the summary on GitHub shows
@@ -86,10 +87,19 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
             "--embed-images is of use with --format markdown only: HTML always holds its images",
         ));
     }
+    // What lies in a record's own folder is a run's.
+    if !is_same(out, folder) {
+        report::own::check(&record, formats, out, embed, github_file().is_none())?;
+    }
     let wanted = Wanted { formats, images, folder, out, embed, printed: Printed::Text };
     let files = wanted.make(&record)?;
     tell(&told(&files, &record.summary_line()));
     Ok(if args.gate { Exit::of(&record) } else { Exit::Pass })
+}
+
+/// The file that a runner of GitHub takes a step's summary from.
+fn github_file() -> Option<PathBuf> {
+    std::env::var_os(github::VARIABLE).filter(|path| !path.is_empty()).map(PathBuf::from)
 }
 
 /// The files, and what there is to say of them.
@@ -148,8 +158,7 @@ impl Wanted<'_> {
 
     /// Writes the summary and prints the annotations. Returns the summary's file.
     fn github(&self, record: &Record, is_read: bool) -> Result<PathBuf, Failure> {
-        let runner = std::env::var_os(github::VARIABLE).filter(|path| !path.is_empty()).map(PathBuf::from);
-        let written = github::write(record, self.images, runner.as_deref(), self.out)?;
+        let written = github::write(record, self.images, github_file().as_deref(), self.out)?;
         let lines: String = github::annotations(record).into_iter().map(|line| line + "\n").collect();
         if is_read {
             tell(lines.trim_end());

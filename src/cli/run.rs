@@ -11,6 +11,7 @@ use super::{
     tell,
 };
 use crate::{
+    counted::counted,
     gate::Gate,
     judge_cache::JudgeCache,
     record::{Machine, Record, RecordFolder},
@@ -304,7 +305,10 @@ fn tell_ended(record: &Record) {
         tell(&format!("aogauge: {why}"));
     }
     if ended.len() > MOST_ENDED {
-        tell(&format!("aogauge: {} more cases ended with an error: they are in the report", ended.len() - MOST_ENDED));
+        tell(&format!(
+            "aogauge: {} with an error: they are in the report",
+            counted(ended.len() - MOST_ENDED, "more case ended", "more cases ended")
+        ));
     }
 }
 
@@ -342,9 +346,9 @@ fn end_of_shard(args: &Args, record: &ShardRecord, folder: &RecordFolder) -> Res
     let failed = record.units.iter().filter(|d| d.error.is_some()).count();
     let end = record.incomplete.as_ref().map_or_else(String::new, |why| format!("; {why}"));
     tell(&format!(
-        "shard {}: {} units are rendered, {failed} of them failed{end}\n{}: to be merged with the others (aogauge merge)",
+        "shard {}: {} rendered, {failed} of them failed{end}\n{}: to be merged with the others (aogauge merge)",
         record.shard,
-        record.units.len(),
+        counted(record.units.len(), "unit is", "units are"),
         folder.path().display()
     ));
     if args.format == Format::Json {

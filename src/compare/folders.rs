@@ -31,7 +31,7 @@ impl Pairing {
     /// same folder is followed; one that leads out of it, or to a folder, is not.
     ///
     /// # Errors
-    /// Where a folder cannot be read, is a record, or lies deeper than 64.
+    /// Where a folder cannot be read, is a record, or lies deeper than 64, and where the name of an image is not UTF-8.
     pub fn of(reference: &Path, test: &Path) -> Result<Self, CompareError> {
         let (mut left_out, mut images) = (0, Vec::new());
         for folder in [reference, test] {
@@ -81,7 +81,8 @@ fn walk(
         if kind.is_dir() {
             walk(root, &path, depth + 1, found, left_out)?;
         } else if has_image_extension(&path) && (kind.is_file() || kind.is_symlink() && is_file_within(root, &path)) {
-            found.insert(relative(root, &path));
+            let name = relative(root, &path).ok_or_else(|| CompareError::Name { file: path.clone() })?;
+            found.insert(name);
         } else {
             *left_out += 1;
         }
@@ -93,9 +94,11 @@ fn is_file_within(root: &Path, link: &Path) -> bool {
     fs::canonicalize(link).is_ok_and(|target: PathBuf| target.starts_with(root) && target.is_file())
 }
 
-fn relative(root: &Path, path: &Path) -> String {
+/// None where a name on the way is no text.
+fn relative(root: &Path, path: &Path) -> Option<String> {
     let within = path.strip_prefix(root).unwrap_or(path);
-    within.components().map(|c| c.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/")
+    let names: Option<Vec<&str>> = within.components().map(|c| c.as_os_str().to_str()).collect();
+    Some(names?.join("/"))
 }
 
 #[cfg(test)]
@@ -124,6 +127,18 @@ mod tests {
         #[cfg(unix)]
         assert_eq!((found.both, found.left_out), (vec!["sub/y.EXR".into(), "within.png".into(), "x.png".into()], 4));
         assert_eq!((found.missing, found.new), (vec!["gone.jpg".into()], vec!["sub/new.hdr".into()]));
+        #[cfg(target_os = "linux")]
+        {
+            use std::{ffi::OsStr, os::unix::ffi::OsStrExt};
+            let odd = a.join(OsStr::from_bytes(b"\xe9"));
+            fs::create_dir(&odd).unwrap();
+            fs::write(odd.join("notes.txt"), "x").unwrap();
+            assert!(Pairing::of(&a, &b).is_ok());
+            fs::write(odd.join("x.png"), "x").unwrap();
+            let told = Pairing::of(&a, &b).unwrap_err().to_string();
+            assert!(told.contains("\\xE9/x.png") && told.contains("not UTF-8"), "{told}");
+            fs::remove_file(odd.join("x.png")).unwrap();
+        }
         fs::write(b.join("record.json"), "{}").unwrap();
         assert!(Pairing::of(&a, &b).unwrap_err().to_string().contains("is a record"));
     }

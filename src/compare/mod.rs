@@ -157,6 +157,14 @@ pub enum CompareError {
         /// The folder.
         folder: PathBuf,
     },
+    /// The name of an image is no text, and pairs are told by their names.
+    #[error(
+        "{file:?}: the name of this image is not UTF-8, and no report could name it: rename it; nothing is compared"
+    )]
+    Name {
+        /// The image; its message shows bytes that are no text as escapes.
+        file: PathBuf,
+    },
     /// Folders in folders without end.
     #[error("{}: folders lie more than {most} deep", folder.display())]
     Deep {

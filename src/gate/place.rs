@@ -1,6 +1,7 @@
 //! Where a verdict's number comes from: which pixels, and a picture of them.
 
 use crate::{
+    counted::counted,
     metrics::{Metric, MetricName, artifact::Brighter, regions::Region},
     record::{CaseRecord, SceneRecord, pictures},
 };
@@ -9,22 +10,22 @@ use crate::{
 pub(super) fn place(metric: &Metric, scene: &SceneRecord, case: Option<&CaseRecord>, on_screen: bool) -> String {
     let shown = scene.screen.as_ref().filter(|_| on_screen);
     let regions = shown.map_or(&scene.regions, |s| &s.regions);
-    let counted = |r: Region| match regions.get(&r) {
-        Some(n) => format!("{} ({n} pixels)", r.label()),
+    let sized = |r: Region| match regions.get(&r) {
+        Some(n) => format!("{} ({})", r.label(), counted(*n, "pixel", "pixels")),
         None => r.label().to_owned(),
     };
     let mut text = match (metric.name, metric.region) {
-        (_, Some(region)) => counted(region),
-        (MetricName::OverDarkening | MetricName::RendererDifference, None) => counted(Region::All),
+        (_, Some(region)) => sized(region),
+        (MetricName::OverDarkening | MetricName::RendererDifference, None) => sized(Region::All),
         (MetricName::DistinctReplicates, None) => "all pixels of each replicate".to_owned(),
         (_, None) => {
             let method = case.map_or("Q", |c| c.case.estimator.as_str());
             let flank = match scene.brighter.get(method) {
-                Some(Brighter::Left) => counted(Region::Left),
-                Some(Brighter::Right) => counted(Region::Right),
+                Some(Brighter::Left) => sized(Region::Left),
+                Some(Brighter::Right) => sized(Region::Right),
                 None => "not known".to_owned(),
             };
-            format!("{} against the brighter flank, {flank}", counted(Region::Footprint))
+            format!("{} against the brighter flank, {flank}", sized(Region::Footprint))
         }
     };
     if shown.is_some() {

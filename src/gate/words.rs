@@ -1,7 +1,7 @@
 //! Verdicts in words.
 
 use super::{Gate, Limit, Other, Outcome, POWER, PValue, Verdict, floor::Source};
-use crate::metrics::MetricName;
+use crate::{counted::counted, metrics::MetricName};
 
 /// Why a verdict with p-values came out as it did, in a sentence.
 pub(super) fn reason(gate: &Gate, verdict: &Verdict, family: usize) -> String {
@@ -42,7 +42,8 @@ fn undecided(verdict: &Verdict, family: usize) -> String {
         )
     } else {
         format!(
-            "the interval clears the limit alone, but not over {family} verdicts: that it {what} is not sure ({numbers})"
+            "the interval clears the limit alone, but not over {}: that it {what} is not sure ({numbers})",
+            counted(family, "verdict", "verdicts")
         )
     }
 }
@@ -67,7 +68,7 @@ fn p_words(p: PValue, family: usize) -> String {
     if p.raw == p.adjusted {
         return format!("p = {}", p_text(p.raw));
     }
-    format!("p = {}, {} over {family} verdicts", p_text(p.raw), p_text(p.adjusted))
+    format!("p = {}, {} over {}", p_text(p.raw), p_text(p.adjusted), counted(family, "verdict", "verdicts"))
 }
 
 /// A p-value with two digits that count.
@@ -148,7 +149,13 @@ fn outcome(outcome: Outcome) -> &'static str {
 fn measured(verdict: &Verdict) -> String {
     let Verdict { metric, .. } = verdict;
     let of = match (&verdict.case, &verdict.lacking) {
-        (Some(c), _) => format!("of {} on the {} with {} rays a pixel in {}", c.estimator, c.renderer, c.rays, c.scene),
+        (Some(c), _) => format!(
+            "of {} on the {} with {} a pixel in {}",
+            c.estimator,
+            c.renderer,
+            counted(c.rays, "ray", "rays"),
+            c.scene
+        ),
         (None, Some(estimator)) => format!("of {estimator}"),
         (None, None) if verdict.is_on_judge() => format!("of the judge of {}", verdict.scene),
         (None, None) => format!("in {}", verdict.scene),
@@ -244,7 +251,8 @@ fn evidence(verdict: &Verdict, family: usize) -> Option<String> {
     let corrected = match (family, verdict.spent < 1.0) {
         (..=1, false) => " The run has no other verdict.".to_owned(),
         _ => format!(
-            " Over the {family} verdicts of the run, Holm's correction makes that {} and {}.",
+            " Over the {} of the run, Holm's correction makes that {} and {}.",
+            counted(family, "verdict", "verdicts"),
             p_text(holds.adjusted),
             p_text(broken.adjusted)
         ),

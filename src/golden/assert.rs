@@ -307,7 +307,7 @@ mod tests {
         assert!(plain.check("a", &picture(255), &Limits::default().into()).is_err());
         let small = RgbImage::new(2, 2).into();
         let error = plain.check("a", &small, &Tolerance::Exact).unwrap_err().to_string();
-        assert!(error.contains("[24, 16]") && error.contains("[2, 2]"), "{error}");
+        assert!(error.contains("24 x 16") && error.contains("2 x 2"), "{error}");
 
         fs::write(&file, "version https://git-lfs.github.com/spec/v1\n").unwrap();
         let error = plain.check("a", &picture(90), &Tolerance::Exact).unwrap_err().to_string();

@@ -40,7 +40,7 @@ pub use rejected::Rejected;
 pub use sampled::{Sampled, TileMeans};
 pub use stale::{STALE_LEVEL, Stale};
 pub use store::{About, Entry, Slot, Snapshot, Store, check_golden_name, golden_cases};
-pub use verify::{ALPHA, Against, Checked, Outcome, VERSION, Verdict, Verification};
+pub use verify::{ALPHA, Against, Checked, Outcome, Unreadable, VERSION, Verdict, Verification};
 
 #[cfg(test)]
 mod tests;

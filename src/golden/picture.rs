@@ -2,6 +2,7 @@
 
 use super::{Comparison, Limits, Sampled, Terms, TileMeans, compare, sampled::layer};
 use crate::{
+    counted::counted,
     disk::DiskError,
     layers::{Layers, load, pixel_hash, write_png},
     metrics::image::{DEFAULT_PPD, Encoding, Image, Pair, flip, signed_map},
@@ -212,11 +213,13 @@ impl Picture {
         let (a, b) = (golden.as_image()?, self.as_image()?);
         if a.size() != b.size() || a.planes().len() != b.planes().len() {
             return Err(format!(
-                "the golden is {:?} pixels of {} channels, the image {:?} of {}",
-                a.size(),
-                a.planes().len(),
-                b.size(),
-                b.planes().len()
+                "the golden has {} x {} pixels of {}, the image {} x {} of {}",
+                a.size()[0],
+                a.size()[1],
+                counted(a.planes().len(), "channel", "channels"),
+                b.size()[0],
+                b.size()[1],
+                counted(b.planes().len(), "channel", "channels")
             ));
         }
         let told = |(pixels, first): (usize, usize)| {

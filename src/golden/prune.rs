@@ -5,6 +5,7 @@ use super::{
     store::{Snapshot, golden_cases},
 };
 use crate::{
+    counted::counted,
     disk::DiskError,
     record::Record,
     suite::{Plan, Platform, Rays, Suite},
@@ -31,7 +32,8 @@ pub fn named_by_record(record: &Record, of_suite: &BTreeSet<Slot>) -> Result<BTr
     match of_suite.difference(&named).next() {
         None => Ok(named),
         Some(Slot { scene, estimator, rays, .. }) => Err(format!(
-            "the record has no golden case of estimator '{estimator}' in scene '{scene}' at {rays} rays, which its suite '{}' names: give a record of the whole suite",
+            "the record has no golden case of estimator '{estimator}' in scene '{scene}' at {}, which its suite '{}' names: give a record of the whole suite",
+            counted(*rays, "ray", "rays"),
             record.suite.name
         )),
     }

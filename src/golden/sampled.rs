@@ -1,6 +1,7 @@
 //! An image with what statistics need to know of it.
 
 use crate::{
+    counted::counted,
     disk::DiskError,
     layers::Layers,
     stats::{IndependentPixels, Replicates, TILE},
@@ -111,7 +112,7 @@ impl Sampled {
             let images: Vec<&[f32]> =
                 layers.layers.iter().filter(|(n, _)| n.starts_with("replicate-")).map(|(_, v)| v.as_slice()).collect();
             if images.len() != replicates as usize {
-                let why = format!("{} layers 'replicate-NNNN', {replicates} are wanted", images.len());
+                let why = format!("{} 'replicate-NNNN', {replicates} wanted", counted(images.len(), "layer", "layers"));
                 return Err(DiskError::content(path, why));
             }
             Some(TileMeans::of(layers.resolution, &images))

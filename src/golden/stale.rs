@@ -1,6 +1,7 @@
 //! Many cases that moved alike: the goldens are probably older than the renderer.
 
 use super::{Checked, Outcome, Verdict};
+use crate::counted::counted;
 use schemars::JsonSchema;
 use serde::Serialize;
 use statrs::distribution::{Binomial, DiscreteCDF};
@@ -26,9 +27,9 @@ impl Stale {
     /// One sentence for people.
     pub fn line(&self) -> String {
         format!(
-            "{} of {} goldens differ, {} brighter and {} darker (sign test, p = {:.1e}): the goldens are probably stale, or a setting changed",
+            "{} of {} differ, {} brighter and {} darker (sign test, p = {:.1e}): the goldens are probably stale, or a setting changed",
             self.brighter + self.darker,
-            self.compared,
+            counted(self.compared, "golden", "goldens"),
             self.brighter,
             self.darker,
             self.p

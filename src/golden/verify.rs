@@ -1,20 +1,24 @@
 //! Holding a record against its goldens.
 
 use super::{
-    Comparison, Golden, Rejected, Slot, Store, Terms,
+    Comparison, Golden, Rejected, Sampled, Slot, Store, Terms,
     approve::{definition, sampled},
     compare,
     stale::{Stale, stale},
     store::{Snapshot, golden_cases},
 };
 use crate::{
+    counted::counted,
     disk::DiskError,
     record::{CaseRecord, Record},
 };
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 /// Family error of a verification: the chance that any golden of an unchanged
 /// renderer is refused.
@@ -46,6 +50,15 @@ pub struct Against {
     pub verdict: Verdict,
 }
 
+/// A golden that cannot be read: broken, a Git LFS pointer, or changed by anything but an approval.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Unreadable {
+    /// The golden's file.
+    pub golden: PathBuf,
+    /// Why, with the file that was read.
+    pub why: String,
+}
+
 /// A case and what came of it.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Checked {
@@ -55,8 +68,10 @@ pub struct Checked {
     pub golden: PathBuf,
     /// What came of it.
     pub verdict: Verdict,
-    /// Other goldens of the case. Those after one that holds were not looked at.
+    /// Other goldens of the case. Those after one that holds were not compared.
     pub others: Vec<Against>,
+    /// Goldens of the case that cannot be read, whether or not another one holds.
+    pub unreadable: Vec<Unreadable>,
     /// Why a reviewer refused this very image; null where none did.
     pub rejected: Option<String>,
 }
@@ -139,8 +154,15 @@ impl Checked {
             (n, Outcome::Pass) => format!("; {} holds, {n} before it did not", name(&self.golden)),
             (n, _) => format!("; nearest of {}: {}", n + 1, name(&self.golden)),
         };
+        let unreadable: String =
+            self.unreadable_beside().map(|u| format!("; UNREADABLE beside it: {}", u.why)).collect();
         let rejected = self.rejected.as_ref().map_or_else(String::new, |why| format!("; rejected before: {why}"));
-        format!("{text}{others}{rejected}")
+        format!("{text}{others}{unreadable}{rejected}")
+    }
+
+    /// Goldens that cannot be read, beside the one that the verdict is of.
+    pub fn unreadable_beside(&self) -> impl Iterator<Item = &Unreadable> {
+        self.unreadable.iter().filter(|u| u.golden != self.golden)
     }
 }
 
@@ -148,6 +170,26 @@ impl Verification {
     /// How many cases came to this end.
     pub fn count(&self, outcome: Outcome) -> usize {
         self.cases.iter().filter(|c| c.outcome() == outcome).count()
+    }
+
+    /// One sentence that counts what cases came to, and goldens beside theirs that cannot be read.
+    pub fn summary(&self) -> String {
+        let [pass, fail, blind, missing, lost] =
+            [Outcome::Pass, Outcome::Fail, Outcome::Blind, Outcome::Missing, Outcome::Lost].map(|o| self.count(o));
+        let beside: BTreeSet<&Path> =
+            self.cases.iter().flat_map(Checked::unreadable_beside).map(|u| u.golden.as_path()).collect();
+        let beside = match beside.len() {
+            0 => String::new(),
+            n => format!("; {} beside them cannot be read", counted(n, "golden", "goldens")),
+        };
+        format!(
+            "{pass} hold, {fail} differ, {blind} too noisy to tell, {missing} missing or unusable, {lost} lost{beside}"
+        )
+    }
+
+    /// Whether some golden cannot be read.
+    pub fn has_unreadable(&self) -> bool {
+        self.cases.iter().any(|c| !c.unreadable.is_empty())
     }
 }
 
@@ -177,11 +219,15 @@ impl Store {
 
     fn check(&self, snapshot: &Snapshot, folder: &Path, record: &Record, case: &CaseRecord, family: usize) -> Checked {
         let slot = Slot::of(case);
-        let name = case.case.id();
-        let lost = |why: String| {
-            let golden = self.path(&slot);
-            Checked { case: name.clone(), golden, verdict: Verdict::Lost(why), others: Vec::new(), rejected: None }
+        let checked = |golden: PathBuf, verdict: Verdict| Checked {
+            case: case.case.id(),
+            golden,
+            verdict,
+            others: Vec::new(),
+            unreadable: Vec::new(),
+            rejected: None,
         };
+        let lost = |why: String| checked(self.path(&slot), Verdict::Lost(why));
         if let Some(error) = &case.error {
             return lost(error.clone());
         }
@@ -189,67 +235,63 @@ impl Store {
             Ok(image) => image,
             Err(e) => return lost(e.to_string()),
         };
-        let mut all: Vec<Against> = Vec::new();
+        let (mut all, mut unreadable, mut holds) = (Vec::new(), Vec::new(), false);
         for (own, path) in snapshot.files.iter().filter(|(own, _)| own.is_beside(&slot)) {
-            let verdict = match usable(path, record, case, &image) {
-                Ok(golden) => {
-                    let limits = golden.limits.unwrap_or_default();
-                    let terms = Terms { alpha: ALPHA, family, limits, regions: &golden.regions };
-                    Verdict::Compared(Box::new(compare(&golden.image, &image, &terms)))
-                }
-                Err(why) => Verdict::Unusable(why),
-            };
-            let holds = verdict.outcome() == Outcome::Pass;
-            all.push(Against { golden: self.path(own), verdict });
-            if holds {
-                break;
+            let golden = self.path(own);
+            let read = Golden::read(path).map_err(|e| e.to_string());
+            if let Err(why) = &read {
+                unreadable.push(Unreadable { golden: golden.clone(), why: why.clone() });
             }
+            if holds {
+                continue;
+            }
+            let usable = read.and_then(|read| misfit(&read, path, record, case, &image).map_or(Ok(read), Err));
+            let verdict = usable.map_or_else(Verdict::Unusable, |golden| {
+                let limits = golden.limits.unwrap_or_default();
+                let terms = Terms { alpha: ALPHA, family, limits, regions: &golden.regions };
+                Verdict::Compared(Box::new(compare(&golden.image, &image, &terms)))
+            });
+            holds = verdict.outcome() == Outcome::Pass;
+            all.push(Against { golden, verdict });
         }
         let nearest = (0..all.len()).min_by(|&a, &b| {
             let ((x, dx), (y, dy)) = (all[a].verdict.rank(), all[b].verdict.rank());
             x.cmp(&y).then(dx.total_cmp(&dy))
         });
-        match nearest {
-            None => {
-                Checked { case: name, golden: self.path(&slot), verdict: Verdict::Missing, others: all, rejected: None }
-            }
-            Some(i) => {
-                let Against { golden, verdict } = all.remove(i);
-                Checked { case: name, golden, verdict, others: all, rejected: None }
-            }
-        }
+        let Some(nearest) = nearest else { return checked(self.path(&slot), Verdict::Missing) };
+        let Against { golden, verdict } = all.remove(nearest);
+        Checked { others: all, unreadable, ..checked(golden, verdict) }
     }
 }
 
-/// The golden, where it is of the case's identity.
-fn usable(path: &Path, record: &Record, case: &CaseRecord, image: &super::Sampled) -> Result<Golden, String> {
-    let golden = Golden::read(path).map_err(|e| e.to_string())?;
+/// Why a golden is not of the case's identity; None where it is.
+fn misfit(golden: &Golden, path: &Path, record: &Record, case: &CaseRecord, image: &Sampled) -> Option<String> {
     let identity = &golden.identity;
     let at = path.display();
     let scene = record.scenes.iter().find(|s| s.name == case.case.scene);
     if scene.is_none_or(|s| s.hash != identity.scene_hash) {
-        return Err(format!("{at}: the golden is of another version of the scene; approve it anew"));
+        return Some(format!("{at}: the golden is of another version of the scene; approve it anew"));
     }
     let wanted = definition(record, &case.case.estimator);
     if identity.definition != wanted {
-        return Err(format!(
+        return Some(format!(
             "{at}: the golden is of {}, the record's '{}' is {wanted}",
             identity.definition, case.case.estimator
         ));
     }
     if identity.rays != case.case.rays || identity.estimator != case.case.estimator {
-        return Err(format!(
-            "{at}: the golden is of {} at {} rays, not what its name says",
-            identity.estimator, identity.rays
+        return Some(format!(
+            "{at}: the golden is of {} at {}, not what its name says",
+            identity.estimator,
+            counted(identity.rays as usize, "ray", "rays")
         ));
     }
     if identity.resolution != image.resolution {
-        return Err(format!("{at}: the golden is {:?} pixels, the image {:?}", identity.resolution, image.resolution));
+        let [[w, h], [width, height]] = [identity.resolution, image.resolution];
+        return Some(format!("{at}: the golden has {w} x {h} pixels, the image {width} x {height}"));
     }
-    if image.tiles.is_some() && golden.image.tiles.is_none() {
-        return Err(format!(
-            "{at}: the golden lacks means of tiles, which smoothed images are compared by; approve it anew"
-        ));
-    }
-    Ok(golden)
+    let lacks = image.tiles.is_some() && golden.image.tiles.is_none();
+    lacks.then(|| {
+        format!("{at}: the golden lacks means of tiles, which smoothed images are compared by; approve it anew")
+    })
 }

@@ -4,7 +4,10 @@ use super::{
     Comparison, Method, Moved,
     compare::{MUST_SEE, RegionShift},
 };
-use crate::stats::{Difference, Scale};
+use crate::{
+    counted::counted,
+    stats::{Difference, Scale},
+};
 
 impl Comparison {
     /// One line for people.
@@ -36,10 +39,14 @@ impl Comparison {
     fn words(&self, moved: &Moved) -> String {
         match moved {
             Moved::NotANumber { pixels, first: [x, y] } => {
-                format!("NaN: {pixels} pixels are no numbers, the first at {x},{y}")
+                format!(
+                    "NaN: {}, the first at {x},{y}",
+                    counted(*pixels, "pixel is no number", "pixels are no numbers")
+                )
             }
             Moved::Structure { pixels, first: [x, y] } => {
-                format!("structure: {pixels} pixels hold a number where the golden has none, the first at {x},{y}")
+                let hold = counted(*pixels, "pixel holds", "pixels hold");
+                format!("structure: {hold} a number where the golden has none, the first at {x},{y}")
             }
             Moved::Rays { scale, share, limit, worst: [left, top, ..], pixels, place: [x, y, w, h] } => {
                 let of = match scale {
@@ -49,9 +56,10 @@ impl Comparison {
                 };
                 format!(
                     "rays: {:.3} % {of} or more are decided differently, rounding may move {:.3} %; \
-                     {pixels} pixels differ, in {x},{y} ({w}x{h}); mean bias {:+.5}",
+                     {}, in {x},{y} ({w}x{h}); mean bias {:+.5}",
                     share * 100.0,
                     limit * 100.0,
+                    counted(*pixels, "pixel differs", "pixels differ"),
                     self.bias
                 )
             }
@@ -60,8 +68,8 @@ impl Comparison {
                 let kind = if brighter { "brighter" } else { "darker" };
                 let region = regions.first().map_or_else(String::new, of_region);
                 format!(
-                    "shift: {kind}, {rejected} of {} tests reject{}{region}; mean bias {:+.5}",
-                    self.tests,
+                    "shift: {kind}, {rejected} of {} reject{}{region}; mean bias {:+.5}",
+                    counted(self.tests, "test", "tests"),
                     place(places),
                     self.bias
                 )
@@ -69,8 +77,8 @@ impl Comparison {
             Moved::Pattern { places, rejected, p } => {
                 let p = p.map_or_else(String::new, |p| format!("; chance that noise explains all pixels: {p:.1e}"));
                 format!(
-                    "structure: pixels moved, no tile did; {rejected} of {} tests reject{}{p}",
-                    self.tests,
+                    "structure: pixels moved, no tile did; {rejected} of {} reject{}{p}",
+                    counted(self.tests, "test", "tests"),
                     place(places)
                 )
             }
@@ -92,5 +100,6 @@ fn place(places: &[Difference]) -> String {
 
 fn of_region(shift: &RegionShift) -> String {
     let p = shift.p.map_or_else(String::new, |p| format!(", p = {p:.1e}"));
-    format!(", most in region {} ({} pixels): {:+.4}{p}", shift.region.label(), shift.pixels, shift.bias)
+    let pixels = counted(shift.pixels, "pixel", "pixels");
+    format!(", most in region {} ({pixels}): {:+.4}{p}", shift.region.label(), shift.bias)
 }

@@ -4,6 +4,7 @@ use super::{
     IntakeError,
     name::{Name, Shown, parse},
 };
+use crate::counted::counted;
 use crate::{disk::DiskError, picture::read::has_image_extension, untrusted};
 use std::{
     collections::BTreeMap,
@@ -195,7 +196,7 @@ impl<'a> Intake<'a> {
         let mut files = Files::default();
         let mut spans = Spans::default();
         for ((scene, estimator, rays), images) in self.found {
-            let title = format!("{scene}, {estimator}, {rays} rays");
+            let title = format!("{scene}, {estimator}, {}", counted(rays, "ray", "rays"));
             let images = paired(images).map_err(|what| wrong(format!("{title}: {what}")))?;
             let handed = Handed { scene, estimator, rays, images };
             spans.add(&handed);
@@ -205,7 +206,9 @@ impl<'a> Intake<'a> {
         for handed in &files.cases {
             let Handed { scene, estimator, rays, .. } = handed;
             let what = missing(handed, &spans, &misnamed);
-            files.warnings.extend(what.map(|what| format!("{scene}, {estimator}, {rays} rays: {what}")));
+            files
+                .warnings
+                .extend(what.map(|what| format!("{scene}, {estimator}, {}: {what}", counted(*rays, "ray", "rays"))));
         }
         let names = |paths: &[PathBuf]| {
             let mut names: Vec<String> =

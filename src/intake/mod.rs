@@ -31,7 +31,7 @@ pub use told::{Keys, examine};
 /// mirror images, and differs with R from a hundredth to ten times.
 pub const SELF_CHECK: &str = include_str!("self-check.toml");
 
-use crate::disk::DiskError;
+use crate::{counted::counted, disk::DiskError};
 use std::path::PathBuf;
 
 /// Why an image cannot be taken.
@@ -101,9 +101,8 @@ pub enum IntakeError {
     Ratio(String),
     /// Pixels that see a surface hold no number.
     #[error(
-        "{path}: {count} pixels that see a surface hold NaN or infinity, the first at column {}, row {} of the view; \
-         every surface needs a number",
-        first[0], first[1]
+        "{path}: {} NaN or infinity, the first at column {}, row {} of the view; every surface needs a number",
+        counted(*count, "pixel that sees a surface holds", "pixels that see a surface hold"), first[0], first[1]
     )]
     Holes {
         /// The file.

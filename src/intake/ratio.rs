@@ -6,6 +6,7 @@ use super::{
     upsample::upsample,
 };
 use crate::{
+    counted::counted,
     layers::{linear, load},
     metrics::image::Encoding,
     picture::read::{self as picture, LayerChoice, Samples, Values},
@@ -79,10 +80,12 @@ impl Ratio {
 
     /// What whoever made the frames should know, one sentence each.
     pub fn remarks(&self) -> Vec<String> {
-        let masked = (self.masked > 0)
-            .then(|| format!("{} pixels are too dark, too roughly rounded or cut off at white: left out", self.masked));
-        let brighter =
-            (self.brighter > 0).then(|| format!("{} pixels are brighter with AO than without it", self.brighter));
+        let masked = (self.masked > 0).then(|| {
+            let are = counted(self.masked, "pixel is", "pixels are");
+            format!("{are} too dark, too roughly rounded or cut off at white: left out")
+        });
+        let brighter = (self.brighter > 0)
+            .then(|| format!("{} brighter with AO than without it", counted(self.brighter, "pixel is", "pixels are")));
         masked.into_iter().chain(brighter).collect()
     }
 }

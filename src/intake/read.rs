@@ -2,6 +2,7 @@
 
 use super::{Declared, IntakeError, Means, Rows, Share, diagnose::number, upsample::upsample};
 use crate::{
+    counted::counted,
     disk::DiskError,
     layers::{linear, load},
     metrics::image::Encoding,
@@ -192,7 +193,8 @@ fn beyond(values: &[f32], width: usize) -> Option<String> {
     let [least, most] = [least, most].map(number);
     let [x, y] = [farthest % width.max(1), farthest / width.max(1)];
     Some(format!(
-        "openness lies outside 0 to 1 at {count} pixels: it is {least} to {most}, farthest at column {x}, row {y}"
+        "openness lies outside 0 to 1 at {}: it is {least} to {most}, farthest at column {x}, row {y}",
+        counted(count, "pixel", "pixels")
     ))
 }
 

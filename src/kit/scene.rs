@@ -2,14 +2,14 @@
 //! views, region map, G-buffer, and a page that says what to render.
 
 use crate::{
-    disk::{DiskError, write_whole},
+    disk::{DiskError, refuse_foreign, write_whole},
     layers::Layers,
     metrics::regions::{Region, Regions},
     render::{Geometry, RenderError, gbuffer::GBuffer},
     scene_files,
     scenes::{Scene, SceneError, Sky},
 };
-use std::{fs, io::Write, path::Path};
+use std::{io::Write, path::Path};
 
 const PAGE: &str = "README.md";
 const REGIONS: &str = "regions.exr";
@@ -44,21 +44,11 @@ pub enum KitError {
 /// As [`write`], and where such a file is there: then nothing is written.
 pub fn write_alone(scene: &Scene, folder: &Path) -> Result<(), KitError> {
     let name = &scene.name;
-    let page = folder.join(PAGE);
+    let model = ["glb", "twin.glb", "toml"].map(|end| format!("{name}.{end}"));
+    let others = [PAGE, "views.json", REGIONS, GBUFFER].map(str::to_owned);
     // The page is written first, so that an export that was killed is known by it as well.
-    if !fs::read_to_string(&page).is_ok_and(|text| text.starts_with(&title(name)) && text.contains(&file_name(name))) {
-        let model = ["glb", "twin.glb", "toml"].map(|end| format!("{name}.{end}"));
-        let others = [PAGE, "views.json", REGIONS, GBUFFER];
-        for file in others.into_iter().chain(model.iter().map(String::as_str)) {
-            let path = folder.join(file);
-            // A link that leads nowhere is somebody's too.
-            if fs::symlink_metadata(&path).is_ok() {
-                let why =
-                    format!("no export of scene '{name}' wrote this file: name another folder; nothing is written");
-                return Err(DiskError::content(&path, why).into());
-            }
-        }
-    }
+    let marks = [&*title(name), &*file_name(name)];
+    refuse_foreign(folder, PAGE, &marks, others.into_iter().chain(model), &format!("export of scene '{name}'"))?;
     write(scene, folder)
 }
 

@@ -7,7 +7,7 @@ use super::{
     judge::QImage,
     regions::{MIN_PIXELS, Region, Regions},
 };
-use crate::stats::Estimate;
+use crate::{counted::counted, stats::Estimate};
 use std::collections::HashSet;
 
 /// One value a replicate.
@@ -76,7 +76,10 @@ pub fn against_judge(
         let all = method.regions.measurable(region)?;
         let pixels: Vec<usize> = all.iter().map(|&i| i as usize).filter(|&i| !image.masked(i)).collect();
         if pixels.len() < MIN_PIXELS {
-            return Err(Absent(format!("only {} pixels of Q are not masked", pixels.len())));
+            return Err(Absent(format!(
+                "only {} not masked",
+                counted(pixels.len(), "pixel of Q is", "pixels of Q are")
+            )));
         }
         over_replicates(method.replicates, |_, own| {
             let sum: f64 = pixels.iter().map(|&i| f(f64::from(own[i] - image.q[i]))).sum();

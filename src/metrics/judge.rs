@@ -7,7 +7,10 @@ use super::{
     artifact::{Brighter, contrast},
     regions::{Region, Regions},
 };
-use crate::stats::{Estimate, Group, jackknife, mean_variance};
+use crate::{
+    counted::counted,
+    stats::{Estimate, Group, jackknife, mean_variance},
+};
 
 /// Pixels whose Q has a larger relative standard error are masked in images.
 pub const MASK_ABOVE: f64 = 0.05;
@@ -89,8 +92,9 @@ pub fn region_q(pairs: &[Pair], regions: &Regions, region: Region, precision: f6
 /// Why metrics take nothing from a judge that is less precise than asked.
 pub fn vague(precision: f64, replicates: usize, wanted: f64) -> Absent {
     Absent(format!(
-        "the judge is less precise than asked: {:.2} % of a region mean after {replicates} replicates, {:.2} % wanted",
+        "the judge is less precise than asked: {:.2} % of a region mean after {}, {:.2} % wanted",
         precision * 100.0,
+        counted(replicates, "replicate", "replicates"),
         wanted * 100.0
     ))
 }

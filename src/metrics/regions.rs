@@ -9,6 +9,7 @@ pub use cut::cut_flank;
 pub use finder::{Finder, OccluderRegions};
 
 use super::Absent;
+use crate::counted::counted;
 use crate::{render::gbuffer::GBuffer, trace::Tracer};
 use aogauge_scenes::Scene;
 use schemars::JsonSchema;
@@ -102,9 +103,9 @@ impl Regions {
         let pixels = self.pixels(region);
         if pixels.len() < MIN_PIXELS {
             return Err(Absent(format!(
-                "region '{}' has {} pixels, fewer than {MIN_PIXELS}",
+                "region '{}' has {}, fewer than {MIN_PIXELS}",
                 region.label(),
-                pixels.len()
+                counted(pixels.len(), "pixel", "pixels")
             )));
         }
         Ok(pixels)

@@ -83,7 +83,12 @@ const LONG: usize = 120;
 /// `all` it is of and the first names. Sentences that differ in their numbers alone are told once, the
 /// first of them. `what` they are of is "files" or "cases".
 pub fn told_once(remarks: &[(String, String)], what: &str, all: usize) -> Vec<String> {
-    let key = |text: &str| text.chars().filter(|c| !c.is_ascii_digit() && !"-.".contains(*c)).collect::<String>();
+    // Of one pixel a sentence has other endings than of several.
+    let word = |word: &str| {
+        if word == "are" { "i".to_owned() } else { word.trim_end_matches(['s', ',', ';', ':']).to_owned() }
+    };
+    let plain = |text: &str| text.chars().filter(|c| !c.is_ascii_digit() && !"-.".contains(*c)).collect::<String>();
+    let key = |text: &str| plain(text).split_whitespace().map(word).collect::<Vec<_>>().join(" ");
     let mut groups: Vec<(String, Vec<&(String, String)>)> = Vec::new();
     for remark in remarks {
         let key = key(&remark.1);
@@ -129,7 +134,7 @@ mod tests {
         assert_eq!(told(&[("a", "dark"), ("b", "dark")], 2), ["dark (all 2 files)"]);
         let five = ["a", "b", "c", "d", "e"].map(|n| (n, "dark"));
         assert_eq!(told(&five, 9), ["dark (5 files: a, b, c and 2 more)"]);
-        let numbers = [("a", "7 pixels, -0.5"), ("b", "123 pixels, 1"), ("c\nd", "1 pixels, 0.25")];
+        let numbers = [("a", "7 pixels, -0.5"), ("b", "123 pixels, 1"), ("c\nd", "1 pixel, 0.25")];
         assert_eq!(told(&numbers, 3), ["a: 7 pixels, -0.5; alike in 2 more files: b, c d"]);
         assert_eq!(told(&[], 3), [""; 0]);
     }

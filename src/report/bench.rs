@@ -4,10 +4,14 @@ pub mod cpu;
 
 use crate::{
     bench::{GpuBench, MethodBench, SceneBench},
+    counted::counted,
     render::gpu::Clock,
     stats::Spread,
 };
 use std::fmt::Write as _;
+
+/// The heading of the page.
+pub const TITLE: &str = "AO on the GPU";
 
 /// Median and quartiles.
 fn spread(s: &Spread) -> String {
@@ -20,20 +24,24 @@ fn conditions(bench: &GpuBench) -> String {
         Clock::WallClock => "the CPU's clock, for want of timestamp queries",
     };
     format!(
-        "{}{}\n{} x {}, median [quartiles] of {} rounds by {clock}, after {} to warm up",
+        "{}{}\n{} x {}, median [quartiles] of {} by {clock}, after {} to warm up",
         bench.adapter,
         if bench.is_software { ", a software adapter" } else { "" },
         bench.resolution[0],
         bench.resolution[1],
-        bench.rounds,
+        counted(bench.rounds, "round", "rounds"),
         bench.warm_up
     )
 }
 
 fn title(scene: &SceneBench) -> String {
     format!(
-        "{}: {} triangles, R = {} m, R' = {} m, {} pixels see a surface",
-        scene.name, scene.triangles, scene.radius, scene.secondary_radius, scene.pixels
+        "{}: {}, R = {} m, R' = {} m, {} a surface",
+        scene.name,
+        counted(scene.triangles, "triangle", "triangles"),
+        scene.radius,
+        scene.secondary_radius,
+        counted(scene.pixels, "pixel sees", "pixels see")
     )
 }
 
@@ -70,7 +78,7 @@ pub fn plain(bench: &GpuBench) -> String {
 
 /// For a page.
 pub fn markdown(bench: &GpuBench) -> String {
-    let mut text = format!("# AO on the GPU\n\n{}.\n", conditions(bench).replace('\n', ": "));
+    let mut text = format!("# {TITLE}\n\n{}.\n", conditions(bench).replace('\n', ": "));
     for scene in &bench.scenes {
         let _ = writeln!(text, "\n## {}\n\n{}.\n", scene.name, title(scene));
         text +=

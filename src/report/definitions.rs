@@ -1,6 +1,6 @@
 //! Each word of a report in two sentences.
 
-use crate::record::Record;
+use crate::{counted::counted, record::Record};
 use serde::Serialize;
 
 /// A word and what it means.
@@ -73,8 +73,9 @@ pub(super) fn of(record: &Record) -> Vec<Definition> {
             "metrics.md",
             "error-under-occluders",
             format!(
-                "is the mean difference from the same estimator with {rays} rays{unsmoothed}, its converged image: 0 is \
-                 right. It is free of noise, so it shows mistakes and not too few rays."
+                "is the mean difference from the same estimator with {}{unsmoothed}, its converged image: 0 is \
+                 right. It is free of noise, so it shows mistakes and not too few rays.",
+                counted(rays, "ray", "rays")
             ),
         ),
         define(

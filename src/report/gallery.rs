@@ -10,7 +10,7 @@ use std::{
     collections::{BTreeMap, BTreeSet},
     fs,
     io::Write as _,
-    path::PathBuf,
+    path::{Path, PathBuf},
 };
 
 /// Pictures by their place relative to the page.
@@ -45,6 +45,17 @@ impl Gallery {
                 Ok(())
             }
         }
+    }
+
+    /// Moves all that was drawn into another folder of the same file system.
+    pub(super) fn put_into(&self, folder: &Path) -> Result<(), DiskError> {
+        for picture in &self.drawn {
+            let to = folder.join(picture);
+            let within = to.parent().unwrap_or(folder);
+            fs::create_dir_all(within).map_err(DiskError::io(within, "create the folder"))?;
+            fs::rename(self.folder.join(picture), &to).map_err(DiskError::io(&to, "rename the finished file"))?;
+        }
+        Ok(())
     }
 
     /// Whether the page holds its pictures.

@@ -14,13 +14,14 @@ pub mod html;
 pub mod junit;
 mod markdown;
 mod occluders;
+pub(crate) mod own;
 pub(crate) mod picture;
 pub mod plots;
 mod pooled;
 pub mod table;
 
 use crate::{
-    disk::{DiskError, write_whole},
+    disk::{DiskError, is_same, part_folder, write_whole},
     gate::Verdict,
     layers::Layers,
     metrics::judge::too_noisy,
@@ -32,7 +33,7 @@ use crate::{
     untrusted,
 };
 use gallery::Gallery;
-use std::{collections::BTreeMap, io::Write, path::Path};
+use std::{collections::BTreeMap, fs, io::Write, path::Path};
 
 /// The name of the report in its folder.
 pub const FILE: &str = "report.md";
@@ -124,8 +125,12 @@ pub fn write_markdown(record: &Record, record_folder: &Path, out: &Path, embed: 
     }
     let aside = if embed {
         Some(tempfile::tempdir().map_err(DiskError::io(&std::env::temp_dir(), "make a folder"))?)
-    } else {
+    } else if is_same(record_folder, out) {
         None
+    } else {
+        // Drawn there, so that what fails leaves no pictures that the next report would take for those of others.
+        fs::create_dir_all(out).map_err(DiskError::io(out, "create the folder"))?;
+        Some(part_folder(out)?)
     };
     let folder = aside.as_ref().map_or(out, |aside| aside.path());
     let mut gallery = Gallery::new(folder.to_owned(), embed);
@@ -137,6 +142,9 @@ pub fn write_markdown(record: &Record, record_folder: &Path, out: &Path, embed: 
     gallery.plot(&pictures::cost(), plots::cost(record))?;
     gallery.plot(&pictures::p_values(), plots::p_values(record))?;
     let text = markdown::text(record, &gallery)?;
+    if !embed && aside.is_some() {
+        gallery.put_into(out)?;
+    }
     write_whole(&out.join(FILE), |buffer| buffer.write_all(text.as_bytes()))?;
     Ok(())
 }

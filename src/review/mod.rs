@@ -9,7 +9,7 @@ pub use server::{Ended, ReviewError, serve};
 use crate::{
     disk::DiskError,
     golden::{
-        Approval, ApproveError, Checked, Golden, Outcome, Rejected, Selection, Store, Verification, golden_cases,
+        Approval, ApproveError, Checked, Golden, Outcome, Rejected, Selection, Slot, Store, Verification, golden_cases,
     },
     record::{CaseRecord, Record},
     report::ReportError,
@@ -67,7 +67,7 @@ pub enum DecideError {
 
 impl Review {
     /// Holds a record in `folder` against a store; of cases whose name contains `only`,
-    /// those are under review that do not hold, or `all`.
+    /// those are under review that [`Review::shown`] tells, or `all`.
     ///
     /// # Errors
     /// Where the record or the store cannot be read.
@@ -100,12 +100,13 @@ impl Review {
         self.decisions.iter().filter(|(_, d)| *d == decision).count()
     }
 
-    /// The cases under review: those that do not hold, those that were decided on, and
+    /// The cases under review: those that do not hold, those with a golden that cannot be read, those that were decided on, and
     /// where all are shown the others.
     pub fn shown(&self) -> impl Iterator<Item = (&Checked, &CaseRecord)> {
         let decided = |id: &str| self.decisions.iter().any(|(case, _)| case == id);
         let cases = self.found.cases.iter();
-        let shown = cases.filter(move |c| self.all || c.outcome() != Outcome::Pass || decided(&c.case));
+        let is_whole = |c: &Checked| c.outcome() == Outcome::Pass && c.unreadable.is_empty();
+        let shown = cases.filter(move |c| self.all || !is_whole(c) || decided(&c.case));
         shown.filter_map(|c| Some((c, golden_cases(&self.record).find(|r| r.case.id() == c.case)?)))
     }
 
@@ -125,22 +126,22 @@ impl Review {
         let Some(hash) = of.hash.clone().filter(|_| of.error.is_none()) else {
             return Err(DecideError::NoImage(case.to_owned()));
         };
-        let golden = checked.golden.display().to_string();
-        let (renderer, limits) = (of.case.renderer.clone(), Golden::read(&checked.golden).ok().and_then(|g| g.limits));
+        let (kept, first) = (checked.golden.display().to_string(), self.approved(of));
+        let (renderer, limits) = (of.case.renderer.clone(), Golden::read(&first).ok().and_then(|g| g.limits));
         let message = match decision {
             Decision::Approve => {
                 let only = Selection::Case(case);
                 let (name, most, dry_run) = (None, None, false);
                 let approval = Approval { reason, only, renderer: &renderer, name, limits, most, dry_run };
                 self.store.approve(&self.folder, &self.record, &approval, &|_| ())?;
-                format!("Approved: {golden}.")
+                format!("Approved: {}.", first.display())
             }
             Decision::Reject => {
                 // What is rejected is what was seen.
                 of.layers(&self.folder)?;
                 let rejected = Rejected { case: case.to_owned(), pixel_hash: hash, reason: reason.to_owned() };
                 self.store.reject(&rejected, &|_| ())?;
-                format!("Rejected: {golden} stays as it is.")
+                format!("Rejected: {kept} stays as it is.")
             }
         };
         self.decisions.retain(|(c, _)| c != case);
@@ -149,11 +150,18 @@ impl Review {
         Ok(message)
     }
 
+    /// The golden that an approval of a case writes: its first one.
+    fn approved(&self, case: &CaseRecord) -> PathBuf {
+        self.store.path(&Slot::of(case))
+    }
+
     /// What a case has come to, as the page names it.
     fn outcome(&self, case: &str) -> &'static str {
         let rejected = self.decisions.iter().any(|(c, d)| c == case && *d == Decision::Reject);
-        match self.found.cases.iter().find(|c| c.case == case).map(Checked::outcome) {
+        let found = self.found.cases.iter().find(|c| c.case == case);
+        match found.map(Checked::outcome) {
             _ if rejected => "fail",
+            Some(Outcome::Pass) if found.is_some_and(|c| !c.unreadable.is_empty()) => "warn",
             Some(Outcome::Pass) => "pass",
             Some(Outcome::Fail) => "fail",
             Some(Outcome::Blind) => "inconclusive",

@@ -2,6 +2,7 @@
 
 use super::Review;
 use crate::{
+    counted::counted,
     golden::{Checked, Golden, Outcome, Sampled, Verdict, sampled},
     record::{CaseRecord, Record, SceneRecord},
     report::{ReportError, html::SceneImages},
@@ -30,21 +31,20 @@ pub(super) fn html(review: &Review, token: &str) -> Result<String, ReportError> 
     let rank = |outcome| ["error", "fail", "warn", "inconclusive", "pass"].iter().position(|o| *o == outcome);
     items.sort_by_key(|i| rank(i.outcome));
     let found = review.verification();
-    let [pass, fail, blind, missing, lost] =
-        [Outcome::Pass, Outcome::Fail, Outcome::Blind, Outcome::Missing, Outcome::Lost].map(|o| found.count(o));
+    let [fail, blind, missing, lost] =
+        [Outcome::Fail, Outcome::Blind, Outcome::Missing, Outcome::Lost].map(|o| found.count(o));
     let store = review.store.folder().display().to_string();
     let page = Page {
         title: format!("Goldens of {}", record.suite.name),
         outcome: match (lost, fail + missing, blind) {
             (1.., ..) => "error",
             (_, 1.., _) => "fail",
+            _ if found.has_unreadable() => "fail",
             (_, _, 1..) => "inconclusive",
             _ => "pass",
         },
         label: None,
-        summary: format!(
-            "{pass} hold, {fail} differ, {blind} too noisy to tell, {missing} missing or unusable, {lost} lost"
-        ),
+        summary: found.summary(),
         notes: found.stale.iter().map(crate::golden::Stale::line).collect(),
         gates: Vec::new(),
         items,
@@ -75,21 +75,35 @@ fn item(
     planes: &mut Planes,
 ) -> Result<Item, ReportError> {
     let of = &case.case;
-    let golden = Golden::read(&checked.golden).ok();
+    let golden = Golden::read_unchecked(&checked.golden).ok();
     let mut pairs = Vec::new();
-    if let (Some(golden), Verdict::Compared(_)) = (&golden, &checked.verdict) {
-        let image = sampled(&review.folder, review.record(), case)?;
-        pairs.push(pair(golden, &image, planes));
+    match (&golden, &checked.verdict) {
+        (Some(golden), Verdict::Compared(_)) => {
+            let image = sampled(&review.folder, review.record(), case)?;
+            pairs.push(pair(golden, &image, planes));
+        }
+        (Some(golden), Verdict::Unusable(_)) => {
+            let image = sampled(&review.folder, review.record(), case)?;
+            pairs.push(unusable(golden, &image, planes));
+        }
+        _ => {}
     }
     pairs.extend(of_scene.pairs(case, planes)?);
     let mut facts = Vec::new();
+    if let Verdict::Unusable(why) = &checked.verdict {
+        facts.push(["unusable because".to_owned(), why.clone()]);
+    }
+    facts.extend(checked.unreadable_beside().map(|u| ["cannot be read".to_owned(), u.why.clone()]));
     if let Some(golden) = &golden {
         let from = &golden.provenance;
         facts.extend([
             ["golden".to_owned(), checked.golden.display().to_string()],
             ["accepted because".to_owned(), from.reason.clone()],
             ["accepted from".to_owned(), format!("{}, {}, aogauge {}", from.renderer, from.device, from.tool)],
-            ["its sample".to_owned(), format!("{} replicates, seed {}", from.replicates, from.seed)],
+            [
+                "its sample".to_owned(),
+                format!("{}, seed {}", counted(from.replicates as usize, "replicate", "replicates"), from.seed),
+            ],
         ]);
     }
     let possible = case.error.is_none() && case.hash.is_some();
@@ -99,9 +113,9 @@ fn item(
         (_, Some(why)) => Some(format!("This very image was rejected: {why}")),
         _ => None,
     };
-    let verb = if golden.is_some() || checked.golden.exists() { "replaces" } else { "makes" };
+    let first = review.approved(case);
     let approve = if possible {
-        format!("{verb} {}", checked.golden.display())
+        format!("{} {}", if first.exists() { "replaces" } else { "makes" }, first.display())
     } else {
         "There is no image to decide on.".to_owned()
     };
@@ -135,5 +149,27 @@ fn pair(golden: &Golden, image: &Sampled, planes: &mut Planes) -> Pair {
         regions: Some(planes.add_regions(size, &golden.regions)),
         note: "Of 100 pixels that are alike, one has a p-value below 0.01 by chance.".into(),
         ..Pair::new(planes, size, images, LIMIT)
+    }
+}
+
+/// The image beside a golden that it cannot be held against, to be looked at; one of another size is brought to the
+/// image's by the nearest of its pixels.
+fn unusable(golden: &Golden, image: &Sampled, planes: &mut Planes) -> Pair {
+    let size = image.resolution;
+    let [width, height] = golden.image.resolution;
+    let (mut name, mut mean) = ("golden, unusable".to_owned(), golden.image.mean.clone());
+    if golden.image.resolution != size {
+        name = format!("golden, unusable: {width} x {height} pixels");
+        let at = |i: u32, own: u32, of: u32| (u64::from(2 * i + 1) * u64::from(of) / u64::from(2 * own)) as usize;
+        let row = |y: u32| at(y, size[1], height) * width as usize;
+        mean = (0..size[1])
+            .flat_map(|y| (0..size[0]).map(move |x| [x, y]))
+            .map(|[x, y]| mean[row(y) + at(x, size[0], width)])
+            .collect();
+    }
+    Pair {
+        label: "beside its golden, which is unusable".into(),
+        note: "The golden is shown as its file has it; nothing was tested.".into(),
+        ..Pair::new(planes, size, [("this image", &image.mean), (&name, &mean)], LIMIT)
     }
 }

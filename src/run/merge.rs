@@ -8,6 +8,7 @@ use super::{
     unit::Unit,
 };
 use crate::{
+    counted::counted,
     disk::DiskError,
     record::{BEGUN, FILE, Machine, Record, RecordFolder, SHARD, aside, is_aside},
     render::{Geometry, Loaded, RenderError, Renderer},
@@ -87,7 +88,11 @@ impl Shards {
         let gone: Vec<String> = (1..=one.shard.of).filter(|k| !there.contains(k)).map(|k| k.to_string()).collect();
         if !gone.is_empty() {
             let of = one.shard.of;
-            return Err(MergeError::Missing(format!("of {of} shards {} are missing: {}", gone.len(), gone.join(", "))));
+            return Err(MergeError::Missing(format!(
+                "of {of} shards {} missing: {}",
+                counted(gone.len(), "is", "are"),
+                gone.join(", ")
+            )));
         }
         if let Some((folder, shard)) = all.iter().find(|(_, s)| s.incomplete.is_some()) {
             let why = shard.incomplete.clone().unwrap_or_default();

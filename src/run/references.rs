@@ -14,6 +14,7 @@ use super::{
     unit::{CONVERGED_REPLICATES, Unit},
 };
 use crate::{
+    counted::counted,
     disk::{DiskError, read_json, read_text, write_json, write_whole},
     layers::{Layers, hex, short_hash},
     metrics::{
@@ -344,7 +345,10 @@ impl References {
         let file = converged(method);
         let replicates = journal::replicates(self.layers(scene, &file)?.as_ref());
         if replicates.len() != CONVERGED_REPLICATES as usize {
-            let why = format!("it holds {} replicates, not {CONVERGED_REPLICATES}", replicates.len());
+            let why = format!(
+                "it holds {}, not {CONVERGED_REPLICATES}",
+                counted(replicates.len(), "replicate", "replicates")
+            );
             return Err(DiskError::content(&self.path(scene, &file), why));
         }
         Ok(Some(Converged::new(replicates)))

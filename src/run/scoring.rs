@@ -14,6 +14,7 @@ use super::{
     subject::Subject,
 };
 use crate::{
+    counted::counted,
     gate::Gate,
     layers::pixel_hash,
     metrics::{
@@ -388,7 +389,7 @@ impl Scored<'_> {
         let suite = self.subject.plan.suite;
         let name = &suite.methods[suite.classic()].name;
         let theirs: Vec<&&CaseImages> = self.handed.iter().filter(|h| h.case.estimator == *name).collect();
-        let images = |n: usize| if n == 1 { "1 image".to_owned() } else { format!("{n} images") };
+        let images = |n: usize| counted(n, "image", "images");
         let counts: Vec<String> = theirs
             .iter()
             .filter(|h| h.is_openness())

@@ -9,6 +9,7 @@ use super::{
     timing,
 };
 use crate::{
+    counted::counted,
     disk::{DiskError, read_json, write_json},
     record::{Budget, Machine, RecordFolder, SHARD, Undecided},
     suite::Platform,
@@ -240,7 +241,7 @@ impl Prepared<'_> {
             incomplete: (missing > 0 || stopped).then(|| {
                 let what = match missing {
                     0 => "not all replicates that it asks for are rendered".to_owned(),
-                    _ => format!("{missing} units are not rendered"),
+                    _ => format!("{} not rendered", counted(missing, "unit is", "units are")),
                 };
                 format!("{}: {what}", early.as_deref().unwrap_or("it ended early"))
             }),

@@ -3,6 +3,7 @@
 
 use super::reading::{Expected, Reader};
 use crate::{
+    counted::counted,
     disk::DiskError,
     intake::{self, Evidence, Handed, HandedImage, Shown},
     metrics::image::Encoding,
@@ -59,9 +60,9 @@ impl Encodings {
             let Some(encoding) = vote.encoding() else { continue };
             told.push(format!(
                 "no encoding is declared and .{format} files of {estimator} store integers: all are taken as \"{}\", which \
-                 is nearer to the references ({} images that vary); declare `encoding`",
+                 is nearer to the references ({}); declare `encoding`",
                 encoding.label(),
-                vote.images
+                counted(vote.images, "image that varies", "images that vary")
             ));
             found.0.insert((format.clone(), estimator.clone()), encoding);
         }

@@ -11,6 +11,7 @@ mod together;
 pub use declaration::{CurveChoice, Declaration, FILE, Fit, KnownCurve};
 
 use crate::{
+    counted::counted,
     disk::DiskError,
     intake::{self, Defaults, Handed, IntakeError},
     record::{HandedIn, UndoneCurve},
@@ -185,6 +186,9 @@ fn check_taken(
         let scenes = scenes.join(", ");
         let what = match not_taken {
             0 => format!("{folder}: no image is called like a scene of the kit"),
+            1 => format!(
+                "{folder}: the one image is not taken; an estimator that the kit does not have is named by --estimator"
+            ),
             n => format!(
                 "{folder}: none of {n} images is taken; an estimator that the kit does not have is named by --estimator"
             ),
@@ -194,8 +198,9 @@ fn check_taken(
     }
     if not_taken > 0 && !is_partial {
         let what = format!(
-            "{folder}: {not_taken} images are not taken; an estimator that the kit does not have is named by --estimator; \
-             --partial leaves such images out"
+            "{folder}: {} not taken; an estimator that the kit does not have is named by --estimator; --partial leaves such \
+             images out",
+            counted(not_taken, "image is", "images are")
         );
         return Err(ScoreError::NotTaken(lines(what, why)));
     }
@@ -205,12 +210,16 @@ fn check_taken(
 /// Refuses an estimator or a number of rays that is declared and that no image is of: the
 /// names of files win, and what was declared may be a slip.
 fn check_used(declaration: &Declaration, handed: &[Handed]) -> Result<(), String> {
-    let counted = |of: &dyn Fn(&Handed) -> String| {
+    let listed = |of: &dyn Fn(&Handed) -> String| {
         let mut found: BTreeMap<String, usize> = BTreeMap::new();
         for h in handed {
             *found.entry(of(h)).or_default() += h.images.len();
         }
-        found.into_iter().map(|(what, n)| format!("{what} ({n} files)")).collect::<Vec<_>>().join(", ")
+        found
+            .into_iter()
+            .map(|(what, n)| format!("{what} ({})", counted(n, "file", "files")))
+            .collect::<Vec<_>>()
+            .join(", ")
     };
     let unused = |field: &str, value: &str, found: String| {
         Err(format!(
@@ -218,10 +227,10 @@ fn check_used(declaration: &Declaration, handed: &[Handed]) -> Result<(), String
         ))
     };
     if let Some(own) = declaration.estimator.as_ref().filter(|own| !handed.iter().any(|h| h.estimator == **own)) {
-        return unused("estimator", &format!("'{own}'"), counted(&|h| h.estimator.clone()));
+        return unused("estimator", &format!("'{own}'"), listed(&|h| h.estimator.clone()));
     }
     if let Some(own) = declaration.rays.filter(|own| !handed.iter().any(|h| h.rays == *own)) {
-        return unused("rays", &own.to_string(), counted(&|h| h.rays.to_string()));
+        return unused("rays", &own.to_string(), listed(&|h| h.rays.to_string()));
     }
     Ok(())
 }
@@ -249,10 +258,10 @@ fn strays(handed: &[Handed]) -> Vec<&Handed> {
 fn stray(h: &Handed, folder: &Path) -> String {
     let file = h.images.first().map(|i| i.path.strip_prefix(folder).unwrap_or(&i.path).display().to_string());
     format!(
-        "{}: of {}, {} rays are in few scenes only: this case is scored, and others of so many rays are not missed",
+        "{}: of {}, {} in few scenes only: this case is scored, and others of so many rays are not missed",
         crate::untrusted::line(&file.unwrap_or_default()),
         h.estimator,
-        h.rays
+        counted(h.rays, "ray is", "rays are")
     )
 }
 

@@ -2,6 +2,7 @@
 
 use super::{ScoreError, encoding::Encodings, self_check, together::Looked};
 use crate::{
+    counted::counted,
     disk::DiskError,
     intake::{
         self, Declared, Finding, Handed, HandedImage, IntakeError, Keys, Means, Pair, PairCause, Reference, Shown,
@@ -428,8 +429,8 @@ pub(super) fn of_frame(frame: &[f32], reference: &Reference, light: Option<&[f32
         return found;
     }
     if least < 0.0 {
-        let count = seen().filter(|v| *v < 0.0).count();
-        found.doubtful.push(format!("negative light: {count} pixels are below 0, the least is {least:.3}"));
+        let are = counted(seen().filter(|v| *v < 0.0).count(), "pixel is", "pixels are");
+        found.doubtful.push(format!("negative light: {are} below 0, the least is {least:.3}"));
     }
     let like: Vec<&[f32]> = std::iter::once(reference.openness.as_slice()).chain(light).collect();
     if let Some(turn) = intake::frame_turn(frame, &like, size) {

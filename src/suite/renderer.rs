@@ -2,6 +2,7 @@
 
 use super::{Case, Method, Rays, Suite, SuiteFile, gate::once};
 use crate::{
+    counted::counted,
     intake::Declared,
     render::external::{External, Slot, Template},
     scenes::{Count, check_name},
@@ -179,8 +180,8 @@ impl RendererFile {
     fn build(&self, suite: &SuiteFile, methods: &[Method], folder: &Path) -> Result<External, String> {
         if self.command.is_empty() || self.command.len() > MOST {
             return Err(format!(
-                "command has {} parts: give the program and its arguments, 1 to {MOST}",
-                self.command.len()
+                "command has {}: give the program and its arguments, 1 to {MOST}",
+                counted(self.command.len(), "part", "parts")
             ));
         }
         if self.estimators.is_empty() {

@@ -21,6 +21,15 @@ fn times_and_rays_add_up() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let bench: GpuBench = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(bench, serde_json::from_slice(&std::fs::read(out.join("bench.json")).unwrap()).unwrap());
+    let page = std::fs::read(out.join("bench.md")).unwrap();
+    std::fs::write(out.join("bench.md"), "# Notes").unwrap();
+    let refused = aogauge(&[&args[..], &more[..]].concat());
+    let told = String::from_utf8_lossy(&refused.stderr);
+    assert!(
+        refused.status.code() == Some(2) && told.contains("bench.md") && told.contains("nothing is written"),
+        "{told}"
+    );
+    std::fs::write(out.join("bench.md"), page).unwrap();
     assert_eq!((bench.resolution, bench.rounds, bench.scenes.len()), ([48, 32], 3, 1));
     let scene = &bench.scenes[0];
     assert!(scene.pixels > 700 && scene.pixels <= 48 * 32, "{}", scene.pixels);

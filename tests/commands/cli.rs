@@ -385,6 +385,35 @@ fn a_report_can_be_made_again() {
         assert!(bytes == fs::read(out.join(&name)).unwrap(), "{}", name.display());
     }
     assert!(again.join("report.md").exists());
+    // Over a report, and over nothing that no report wrote.
+    expect(0, &["report", text(&out), "--out", text(&again), "--format", "markdown,html,junit"]);
+    let all = ["report", text(&out), "--format", "markdown,html,junit", "--out"];
+    expect(0, &[&all[..], &[text(&again)]].concat());
+    let mine = dir.path().join("mine");
+    for file in ["report.md", "report.html", "junit.xml", "pictures/scene/q.png", "pictures/cost.svg"] {
+        let path = mine.join(file);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(&path, "# Notes\n\nmine").unwrap();
+        let before = files(&mine);
+        let told = expect(2, &[&all[..], &[text(&mine)]].concat());
+        let named = if file.starts_with("pictures/scene") { "pictures/scene" } else { file };
+        assert!(told.contains(named) && told.contains("no report of aogauge wrote this"), "{told}");
+        assert!(files(&mine) == before, "{file}");
+        fs::remove_dir_all(&mine).unwrap();
+    }
+    // What fails halfway leaves nothing that the next report would take for another's.
+    let image = fs::read_dir(out.join("images/scene")).unwrap().next().unwrap().unwrap().path();
+    let bytes = fs::read(&image).unwrap();
+    for found in fs::read_dir(out.join("images/scene")).unwrap().flatten() {
+        fs::rename(found.path(), found.path().with_extension("aside")).unwrap();
+    }
+    expect(2, &["report", text(&out), "--out", text(&mine)]);
+    assert_eq!(fs::read_dir(&mine).unwrap().count(), 0);
+    for found in fs::read_dir(out.join("images/scene")).unwrap().flatten() {
+        fs::rename(found.path(), found.path().with_extension("exr")).unwrap();
+    }
+    assert!(fs::read(&image).unwrap() == bytes);
+    expect(0, &["report", text(&out), "--out", text(&mine)]);
 }
 
 /// The maps of a report show the record's own numbers, and the report bears the name
@@ -652,7 +681,7 @@ fn exported_over(dir: &Path, kit: &Path) {
         fs::write(mine.join(file), "# pillar\n\nmine").unwrap();
         let before = files(&mine);
         let told = expect(2, &["scene", "export", "pillar", "--out", text(&mine)]);
-        assert!(told.contains(file) && told.contains("no export of scene 'pillar' wrote this file"), "{told}");
+        assert!(told.contains(file) && told.contains("no export of scene 'pillar' wrote this"), "{told}");
         assert!(files(&mine) == before, "{file}");
         fs::remove_file(mine.join(file)).unwrap();
     }

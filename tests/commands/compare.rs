@@ -331,7 +331,7 @@ fn nan_is_counted_and_told() {
     let scores = scores["pairs"][0].clone();
     assert_eq!(scores["scores"]["non_finite"], serde_json::json!({ "reference": 1, "test": 1, "both": 1 }));
     assert_eq!((value(&scores, "mae"), scores["scores"]["weight"].as_f64()), (0.0, Some(1.0)));
-    assert!(text(&out.stderr).contains("1 pixels of the reference alone, 1 of the test image alone and 1 of both"));
+    assert!(text(&out.stderr).contains("1 pixel of the reference alone, 1 of the test image alone and 1 of both"));
 }
 
 #[test]

@@ -48,6 +48,19 @@ fn json_and_plots_lie_in_the_folder() {
         let svg = read(plot);
         assert!(svg.starts_with("<svg") && svg.contains("extended-counts") && svg.contains("flatland, uniform"));
     }
+    // Over its own, and over nothing of others.
+    let again = [&args[..], &["--out", out.to_str().unwrap()]].concat();
+    passes(&again);
+    for file in ["map.svg", "profiles.svg", "flatland.json"] {
+        let kept = read(file);
+        std::fs::write(out.join(file), "<svg>mine</svg>").unwrap();
+        let refused = aogauge(&again);
+        let told = String::from_utf8_lossy(&refused.stderr);
+        assert_eq!(refused.status.code(), Some(2), "{told}");
+        assert!(told.contains(file) && told.contains("nothing is written"), "{told}");
+        assert_eq!(read(file), "<svg>mine</svg>");
+        std::fs::write(out.join(file), kept).unwrap();
+    }
     let apexes: Vec<_> = printed.profiles.iter().map(|p| p.curves[0].apex).collect();
     assert!(apexes.iter().all(|a| a.height > 0.1 && a.contrast.unwrap() > 0.1), "{apexes:?}");
     assert!(apexes[1].apex > apexes[0].apex, "higher over a larger gap: {apexes:?}");

@@ -238,7 +238,7 @@ fn with_the_golden_s_own_seed_one_wrong_pixel_is_found() {
     mean(&wrong.join("images/scene/classic.cpu.4.exr"), |i, v| if i == place { 1.0 - v } else { v });
     let stderr = expect(1, &["golden", "verify", text(&wrong), "--goldens", text(&goldens), "--only", "classic"]);
     assert!(stderr.contains("same seeds; rays: ") && stderr.contains("of the pixel 9,5 or more"), "{stderr}");
-    assert!(stderr.contains("1 pixels differ, in 9,5 (1x1)"), "{stderr}");
+    assert!(stderr.contains("1 pixel differs, in 9,5 (1x1)"), "{stderr}");
 }
 
 fn pointer(path: &Path) {
@@ -376,7 +376,7 @@ fn goldens_are_removed_by_name_all_or_none() {
     }
     golden(0, &["approve", text(&RUNS.out[0]), "--reason", "r"]);
     let stderr = golden(3, &["remove", "scene/classic.4.third", "scene/classic.4.fourth"]);
-    assert!(stderr.contains("1 of 2 goldens do not exist") && stderr.contains("classic.4.fourth.exr"), "{stderr}");
+    assert!(stderr.contains("1 of 2 goldens does not exist") && stderr.contains("classic.4.fourth.exr"), "{stderr}");
     let stray = dir.path().join("elsewhere/scene");
     fs::create_dir_all(&stray).unwrap();
     let stray = stray.join("classic.4.exr");
@@ -416,7 +416,7 @@ fn a_lost_case_refuses_the_approval_and_growth_is_told() {
     }
     assert!(!goldens.exists());
     let stderr = approve(0, &["--only", "classic"]);
-    assert!(stderr.contains("1 goldens approved") && stderr.contains("kB more than before"), "{stderr}");
+    assert!(stderr.contains("1 golden approved") && stderr.contains("kB more than before"), "{stderr}");
     assert!(approve(0, &["--only", "classic"]).contains(" 0 B more than before"));
     assert!(!stderr.contains("every clone carries them"), "{stderr}");
     // 60 MB that hold nothing.
@@ -477,6 +477,32 @@ fn a_git_lfs_pointer_is_named() {
     // Given up by name, it can be approved.
     expect(0, &["golden", "remove", "scene/classic.4", "--goldens", text(&goldens)]);
     expect(0, &["golden", "approve", text(&RUNS.out[1]), "--goldens", text(&goldens), "--reason", "new"]);
+}
+
+/// Whether it comes before the one that holds, or after it.
+#[test]
+fn a_golden_that_cannot_be_read_is_named_though_another_holds() {
+    let dir = tempfile::tempdir().unwrap();
+    let goldens = dir.path().join("goldens");
+    let approve = ["golden", "approve", text(&RUNS.out[0]), "--goldens", text(&goldens), "--reason", "r"];
+    expect(0, &approve);
+    expect(0, &[&approve[..], &["--as", "b", "--only", "classic"]].concat());
+    let verify = ["golden", "verify", text(&RUNS.out[1]), "--goldens", text(&goldens)];
+    expect(0, &verify);
+    for (broken, holds) in [("classic.4.exr", "classic.4.b.exr"), ("classic.4.b.exr", "classic.4.exr")] {
+        let path = goldens.join("scene").join(broken);
+        let bytes = fs::read(&path).unwrap();
+        fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+        let told = expect(3, &verify);
+        assert!(told.contains(&format!("UNREADABLE beside it: {}", path.display())), "{told}");
+        assert!(told.contains("2 hold, 0 differ") && told.contains("; 1 golden beside them cannot be read"), "{told}");
+        let found: Value = serde_json::from_str(&stdout(&[&verify[..], &["--format", "json"]].concat())).unwrap();
+        let case = found["cases"].as_array().unwrap().iter().find(|c| c["case"] == "scene/classic/cpu/4").unwrap();
+        assert!(case["golden"].as_str().unwrap().ends_with(holds), "{case}");
+        assert_eq!(case["unreadable"].as_array().unwrap().len(), 1);
+        fs::write(&path, bytes).unwrap();
+    }
+    expect(0, &verify);
 }
 
 #[test]

@@ -166,6 +166,43 @@ fn what_is_decided_reaches_the_store_and_nothing_else_does() {
     assert!(!verify().contains("rejected"), "{}", verify());
 }
 
+/// A golden that cannot stand for the image is looked at beside it, with the reason.
+#[test]
+fn unusable_goldens_are_shown_with_their_reason() {
+    let dir = tempfile::tempdir().unwrap();
+    let goldens = store(dir.path(), "classic");
+    let page = |goldens: &Path| {
+        let review = Review::begin(goldens, &["--only", "plane/classic"]);
+        review.get(&format!("/?token={}", review.token), &format!("127.0.0.1:{}", review.port)).1
+    };
+    let golden = goldens.join("plane/classic.4.exr");
+    let mut layers = aogauge::layers::Layers::read(&golden).unwrap();
+    layers.layers.get_mut("mean").unwrap()[7] += 0.25;
+    layers.write(&golden).unwrap();
+    let shown = page(&goldens);
+    assert!(shown.contains("golden, unusable") && shown.contains("not those that were approved"));
+    // Of another size and scene: brought to that of the image.
+    let [width, height] = layers.resolution;
+    let mut half = aogauge::layers::Layers::new([width / 2, height]);
+    half.attributes.clone_from(&layers.attributes);
+    for (name, values) in &layers.layers {
+        let every = values.chunks(width as usize).flat_map(|row| row.iter().step_by(2).copied()).collect();
+        half = half.with(name, every);
+    }
+    half.write(&golden).unwrap();
+    assert!(page(&goldens).contains(&format!("golden, unusable: {} x {height} pixels", width / 2)));
+    // What is no image has its reason alone.
+    std::fs::write(&golden, "cut").unwrap();
+    let shown = page(&goldens);
+    assert!(shown.contains("unusable because") && !shown.contains("golden, unusable"));
+    // Beside one that holds it is under review, too.
+    let args = ["golden", "approve", "2", "--goldens", goldens.to_str().unwrap(), "--reason", "b", "--as", "b"];
+    let args = [&args[..], &["--only", "plane/classic"]].concat();
+    assert!(aogauge(RECORDS.path(), &args).status.success());
+    let shown = page(&goldens);
+    assert!(shown.contains("cannot be read") && shown.contains("replaces") && shown.contains("classic.4.exr"));
+}
+
 #[test]
 fn strangers_are_refused() {
     let dir = tempfile::tempdir().unwrap();

@@ -295,7 +295,7 @@ fn merged_shards_are_the_whole() {
         assert!(stderr.contains(says), "{stderr}");
         assert!(!dir.join("refused/record.json").exists());
     };
-    refused(&parts[1..], 5, "of 3 shards 1 are missing: 2");
+    refused(&parts[1..], 5, "of 3 shards 1 is missing: 2");
     refused(&[&parts[..], &parts[..1]].concat(), 2, "are both shard 2/3");
     // Another commit of the same version may trace otherwise.
     let of_other_build = |path: &Path| {

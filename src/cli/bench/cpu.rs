@@ -2,7 +2,7 @@
 
 use super::{
     super::{Exit, Failure, Format, json, run::bar, scene::load},
-    hand_out,
+    check_out, hand_out,
 };
 use crate::{
     bench::cpu::{CpuBench, Settings, VERSION, processor, scene},
@@ -40,7 +40,7 @@ pub struct Args {
     /// Seed of all randomness.
     #[arg(long, default_value_t = 1)]
     seed: u32,
-    /// Folder for bench.json and bench.md.
+    /// Folder for bench.json and bench.md; no file of others is replaced.
     #[arg(long)]
     out: Option<PathBuf>,
     /// What is printed on standard output.
@@ -54,6 +54,7 @@ fn radius(text: &str) -> Result<f32, String> {
 }
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
+    check_out(args.out.as_deref(), tables::TITLE, "processor")?;
     let scenes = args.scenes.iter().map(|name| load(name)).collect::<Result<Vec<_>, _>>()?;
     let settings = Settings {
         size: args.size,

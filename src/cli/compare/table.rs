@@ -2,6 +2,7 @@
 
 use crate::{
     compare::{ALPHA, Comparison, Exact, LimitReport, LimitState, Outcome, PairReport, Tier, WelchReport},
+    counted::counted,
     metrics::image::{NonFinite, ScoreName, Scores},
     stats,
 };
@@ -83,9 +84,9 @@ fn exact(found: &Exact) -> String {
     let at = found.first.map_or_else(String::new, |[x, y]| format!(", the first at {x}, {y}"));
     let largest = found.largest.map_or_else(|| "NaN or infinity".to_owned(), |l| format!("{l:.6}"));
     format!(
-        "{} of {} pixels differ ({:.6} %){at}; largest difference {largest}\n",
+        "{} of {} ({:.6} %){at}; largest difference {largest}\n",
         found.differing,
-        found.pixels,
+        counted(found.pixels, "pixel differs", "pixels differ"),
         100.0 * found.share
     )
 }
@@ -93,9 +94,8 @@ fn exact(found: &Exact) -> String {
 fn scores(found: &Scores) -> String {
     let [width, height] = found.size;
     let mut text = format!(
-        "{width} x {height} pixels, {} channel{}, {}; FLIP at {} pixels per degree\n\n",
-        found.channels,
-        if found.channels == 1 { "" } else { "s" },
+        "{width} x {height} pixels, {}, {}; FLIP at {} pixels per degree\n\n",
+        counted(found.channels, "channel", "channels"),
         found.encoding.label(),
         found.ppd
     );
@@ -133,7 +133,8 @@ fn welch(found: Option<&WelchReport>) -> String {
         |[lo, hi]| format!(", 95 % interval {lo:+.5} to {hi:+.5}"),
     );
     let mut text = format!(
-        "\nWelch's test of {test} replicates against {reference}, family error {ALPHA}; bias {:+.5}{interval}\n",
+        "\nWelch's test of {} against {reference}, family error {ALPHA}; bias {:+.5}{interval}\n",
+        counted(test, "replicate", "replicates"),
         found.bias
     );
     for scale in &found.scales {
@@ -166,7 +167,8 @@ pub(super) fn warnings(found: &Comparison) -> Vec<String> {
         .map(|(pair, NonFinite { reference, test, both })| {
             let of = if several { format!("{}: ", pair.path) } else { String::new() };
             format!(
-                "warning: {of}NaN or infinity at {reference} pixels of the reference alone, {test} of the test image alone and {both} of both; they are left out"
+                "warning: {of}NaN or infinity at {} of the reference alone, {test} of the test image alone and {both} of both; they are left out",
+                counted(reference, "pixel", "pixels")
             )
         })
         .collect()

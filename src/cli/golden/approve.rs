@@ -2,6 +2,7 @@
 
 use super::{Exit, Failure, bytes, nothing, notice, print, size::parse, tell};
 use crate::{
+    counted::counted,
     golden::{Approval, ApproveError, Candidates, Limits, Selection, Store, check_golden_name},
     record::Record,
     scenes::check_name,
@@ -81,8 +82,8 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     let than = if after < before { "less" } else { "more" };
     let [done, holds] = if args.dry_run { ["would be approved", "would hold"] } else { ["approved", "holds"] };
     tell(&format!(
-        "{} goldens {done}: {}; the store {holds} {}, {} {than} than before",
-        approved.files.len(),
+        "{} {done}: {}; the store {holds} {}, {} {than} than before",
+        counted(approved.files.len(), "golden", "goldens"),
         args.reason,
         bytes(after),
         bytes(after.abs_diff(before))

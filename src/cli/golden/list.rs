@@ -1,7 +1,10 @@
 //! `aogauge golden list`
 
 use super::{Exit, Failure, Format, bytes, existing, json, pending, print, tell};
-use crate::golden::{Entry, VERSION};
+use crate::{
+    counted::counted,
+    golden::{Entry, VERSION},
+};
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -43,7 +46,7 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     }
     let broken = entries.iter().filter(|e| e.unreadable.is_some()).count();
     let total: u64 = entries.iter().map(|e| e.bytes).sum();
-    let said = format!("{} goldens, {}; {broken} cannot be read", entries.len(), bytes(total));
+    let said = format!("{}, {}; {broken} cannot be read", counted(entries.len(), "golden", "goldens"), bytes(total));
     match args.format {
         Format::Text => print(&table(&entries))?,
         Format::Json => print(&json(&Listing { version: VERSION, goldens: entries, interrupted })?)?,

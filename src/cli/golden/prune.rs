@@ -2,8 +2,9 @@
 
 use super::{Exit, Failure, notice, pending, print, tell};
 use crate::{
+    counted::counted,
     golden::{Candidates, Slot, Store, named_by_record, named_by_suite},
-    record::{Record, counted},
+    record::Record,
     suite::{BUILT_IN, Suite},
 };
 use std::{
@@ -41,7 +42,11 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
         pending(store.is_interrupted()?);
     }
     let done = if args.dry_run { "would be removed" } else { "removed" };
-    tell(&format!("{} {done}; {} cases are named", counted(orphans.len(), "golden", "goldens"), named.len()));
+    tell(&format!(
+        "{} {done}; {} named",
+        counted(orphans.len(), "golden", "goldens"),
+        counted(named.len(), "case is", "cases are")
+    ));
     Ok(Exit::Pass)
 }
 

@@ -2,9 +2,9 @@
 
 use super::{Exit, Failure, notice, print, tell};
 use crate::{
+    counted::counted,
     disk::is_same,
     golden::{Slot, Store},
-    record::counted,
 };
 use std::{
     collections::BTreeSet,
@@ -33,12 +33,14 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
         args.names.iter().map(|name| slot(name, &args.goldens)).collect::<Result<_, Failure>>()?;
     let missing = store.remove(&slots, &notice)?;
     if let Some(first) = missing.first() {
-        let message = format!(
-            "{} of {} goldens do not exist, the first is {}; nothing is removed",
-            missing.len(),
-            slots.len(),
-            store.path(first).display()
-        );
+        let path = store.path(first).display().to_string();
+        let message = match (missing.len(), slots.len()) {
+            (_, 1) => format!("there is no {path}; nothing is removed"),
+            (n, all) => {
+                let do_not = if n == 1 { "does not" } else { "do not" };
+                format!("{n} of {all} goldens {do_not} exist, the first is {path}; nothing is removed")
+            }
+        };
         return Err(Failure { exit: Exit::Golden, message });
     }
     for slot in &slots {

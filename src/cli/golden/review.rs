@@ -2,6 +2,7 @@
 
 use super::{Exit, Failure, exit, nothing, print, tell};
 use crate::{
+    counted::counted,
     golden::{Candidates, Store},
     review::{Decision, Ended, Review, serve},
 };
@@ -45,7 +46,10 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     let mut told = Ok(());
     let (ended, review) = serve(review, args.port, |address| {
         told = print(&format!("{address}\n"));
-        tell(&format!("{shown} cases to review: open the address above in a browser; Ctrl-C ends"));
+        tell(&format!(
+            "{} to review: open the address above in a browser; Ctrl-C ends",
+            counted(shown, "case", "cases")
+        ));
     })
     .map_err(|e| Failure::usage(e.to_string()))?;
     told?;

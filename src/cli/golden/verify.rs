@@ -2,7 +2,7 @@
 
 use super::{Exit, Failure, Format, exit, json, nothing, pending, print, tell};
 use crate::{
-    golden::{ALPHA, Candidates, Checked, Outcome, Stale, Store},
+    golden::{ALPHA, Candidates, Checked, Stale, Store},
     record::Record,
 };
 use std::path::PathBuf;
@@ -35,11 +35,7 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
         return Err(nothing(&record, &args.only));
     }
     let mut lines: Vec<String> = found.cases.iter().map(Checked::line).collect();
-    let [pass, fail, blind, missing, lost] =
-        [Outcome::Pass, Outcome::Fail, Outcome::Blind, Outcome::Missing, Outcome::Lost].map(|o| found.count(o));
-    lines.push(format!(
-        "{pass} hold, {fail} differ, {blind} too noisy to tell, {missing} missing or unusable, {lost} lost; family error {ALPHA}"
-    ));
+    lines.push(format!("{}; family error {ALPHA}", found.summary()));
     lines.extend(found.stale.as_ref().map(Stale::line));
     match args.format {
         Format::Text => print(&(lines.join("\n") + "\n"))?,

@@ -2,6 +2,7 @@
 
 use crate::{
     cli::{Exit, Failure, print, tell},
+    counted::counted,
     record::Record,
     run::{Prepared, Shard},
 };
@@ -40,10 +41,15 @@ pub(super) fn tell_plan(
     } else {
         format!("; how long is not known: there is no record in {} to tell", out.display())
     };
-    tell(&format!("{} units, {:.1} million rays{time}; nothing is rendered", steps.len(), total as f64 / 1e6));
+    tell(&format!(
+        "{}, {:.1} million rays{time}; nothing is rendered",
+        counted(steps.len(), "unit", "units"),
+        total as f64 / 1e6
+    ));
     if let Some([usual, most]) = until_sure {
         tell(&format!(
-            "with --until-sure this is no bound: it counts {usual} replicates a case, and a case takes {} to {most}",
+            "with --until-sure this is no bound: it counts {} a case, and a case takes {} to {most}",
+            counted(usual, "replicate", "replicates"),
             most.min(4)
         ));
     }

@@ -3,6 +3,7 @@
 use super::{load, source};
 use crate::{
     cli::{Exit, Failure, Format, json, print, tell},
+    counted::counted,
     preview,
     scenes::{Material, Mesh, Parameters, Scene, Sky, luminance},
 };
@@ -118,13 +119,10 @@ fn environment(scene: &Scene) -> String {
         }
     };
     let lamps = scene.objects.iter().filter(|o| luminance(o.material.emissive) > 0.0).count();
-    let counted = |n: usize, what: &str| match n {
-        0 => String::new(),
-        1 => format!(", 1 {what}"),
-        n => format!(", {n} {what}s"),
-    };
-    let portals = counted(scene.environment.portals.len(), "portal");
-    sky + &portals + &counted(lamps, "lamp") + &counted(scene.lights.len(), "punctual light")
+    let more = |n: usize, one, many| if n == 0 { String::new() } else { format!(", {}", counted(n, one, many)) };
+    sky + &more(scene.environment.portals.len(), "portal", "portals")
+        + &more(lamps, "lamp", "lamps")
+        + &more(scene.lights.len(), "punctual light", "punctual lights")
 }
 
 /// Three numbers, to a tenth of a millimetre.
@@ -163,14 +161,22 @@ impl Shown {
             let [lo, hi] = o.bounds.map(point);
             let mark = if o.occluder { "occluder" } else { "" };
             let (name, triangles) = (&o.name, o.triangles);
-            format!("{name:<width$}  {triangles:>9} triangles  {mark:<8}  {lo} to {hi} m  {}\n", o.material.text())
+            format!(
+                "{name:<width$}  {triangles:>9} {:<9}  {mark:<8}  {lo} to {hi} m  {}\n",
+                if triangles == 1 { "triangle" } else { "triangles" },
+                o.material.text()
+            )
         });
         text.extend(rows);
         let t = &self.totals;
         let [lo, hi] = t.bounds.map(point);
         text += &format!(
-            "\n# Totals\n\ntriangles    {} in {} objects\noccluders    {}, {} triangles\nbounds       {lo} to {hi} m\nenvironment  {}\n",
-            t.triangles, t.objects, t.occluders, t.occluder_triangles, t.environment
+            "\n# Totals\n\ntriangles    {} in {}\noccluders    {}, {}\nbounds       {lo} to {hi} m\nenvironment  {}\n",
+            t.triangles,
+            counted(t.objects, "object", "objects"),
+            t.occluders,
+            counted(t.occluder_triangles, "triangle", "triangles"),
+            t.environment
         );
         if !t.cameras.is_empty() {
             text += &format!("cameras      {}\n", t.cameras.join(", "));

@@ -24,7 +24,7 @@ const CURVED: f64 = 1.25;
 const GAINED: f64 = 1.15;
 /// Standard errors between two hypotheses that are told from each other.
 pub(super) const SURE: f64 = 4.0;
-/// sRGB is near the power 1/2.2; powers in this range are an encoding for display.
+/// sRGB is near the power 1/2.2; powers in this range are an encoding for display: gammas of 1.8 to 2.6 and what a fit misses them by.
 const DISPLAY: [f64; 2] = [1.0 / 2.7, 1.0 / 1.7];
 /// The reference must deviate by so much that a strength, one free number, can be told.
 const BLENDED: f64 = 0.05;
@@ -203,10 +203,18 @@ fn by_one_number(held: &[Held<'_>]) -> Vec<Finding> {
     found
 }
 
+/// Whether openness to this power is rather encoded for display than meant so.
+pub(super) fn is_display(exponent: f64) -> bool {
+    (DISPLAY[0]..DISPLAY[1]).contains(&exponent)
+}
+
 /// A curve, or the encoding for display that its exponent speaks for.
 fn of_power(gain: f64, exponent: f64) -> Finding {
-    let is_display = (DISPLAY[0]..DISPLAY[1]).contains(&exponent) && (0.95..1.05).contains(&gain);
-    if is_display { Finding::Encoded { gamma: Some(1.0 / exponent) } } else { Finding::Curve { gain, exponent } }
+    if is_display(exponent) && (0.95..1.05).contains(&gain) {
+        Finding::Encoded { gamma: Some(1.0 / exponent) }
+    } else {
+        Finding::Curve { gain, exponent }
+    }
 }
 
 /// The image as it would be without what was found.

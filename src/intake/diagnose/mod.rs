@@ -20,7 +20,10 @@ pub use meaning::{Held, agree, meaning_of};
 pub use pair::{Pair, PairCause, pair_causes};
 pub use place::{Turn, alike};
 
-use crate::metrics::regions::{Region, Regions};
+use crate::{
+    counted::counted,
+    metrics::regions::{Region, Regions},
+};
 use samples::Samples;
 use std::{borrow::Cow, fmt};
 
@@ -283,20 +286,24 @@ impl Finding {
     /// What was found, in a few words.
     pub fn title(&self) -> String {
         match self {
-            Finding::Size { found, expected } => format!("wrong size: {found} pixels, not {expected}"),
+            Finding::Size { found, expected } => {
+                format!("wrong size: {}, not {expected}", counted(*found, "pixel", "pixels"))
+            }
             Finding::Holes { count, infinite, first: [x, y] } => {
                 let what = match *infinite {
                     0 => "NaN",
                     n if n == *count => "infinity",
                     _ => "NaN and infinity",
                 };
-                format!("{what}: {count} pixels that see a surface hold no number, the first at column {x}, row {y}")
+                let hold = counted(*count, "pixel that sees a surface holds", "pixels that see a surface hold");
+                format!("{what}: {hold} no number, the first at column {x}, row {y}")
             }
             Finding::Range { least, most, scale, count, farthest: [x, y] } => {
                 let at = match scale {
                     Some(_) => String::new(),
                     None => {
-                        format!("; {count} pixels are more than 1 beyond that, the farthest at column {x}, row {y}")
+                        let are = counted(*count, "pixel is", "pixels are");
+                        format!("; {are} more than 1 beyond that, the farthest at column {x}, row {y}")
                     }
                 };
                 let [least, most] = [*least, *most].map(number);
@@ -304,7 +311,8 @@ impl Finding {
             }
             Finding::Negative { count, least, is_signed, .. } => {
                 let signed = if *is_signed { ", as if it ran from -1 to 1" } else { "" };
-                format!("negative openness: {count} pixels are below 0, the least is {least:.3}{signed}")
+                let are = counted(*count, "pixel is", "pixels are");
+                format!("negative openness: {are} below 0, the least is {least:.3}{signed}")
             }
             Finding::Constant { value: 0.0 } => "black: 0 everywhere, as of a buffer that was cleared".to_owned(),
             Finding::Constant { value } => format!("constant: {value} everywhere"),
@@ -334,7 +342,10 @@ impl Finding {
             Finding::Between { low, high } => {
                 format!("scaled scene: R is between {} and {} times what was asked for", written(*low), written(*high))
             }
-            Finding::Shifted { pixels: [x, y] } => format!("shifted by {x} columns and {y} rows"),
+            Finding::Shifted { pixels: [x, y] } => {
+                let of = |n: f64, one, many| if n.abs() == 1.0 { format!("{n} {one}") } else { format!("{n} {many}") };
+                format!("shifted by {} and {}", of(*x, "column", "columns"), of(*y, "row", "rows"))
+            }
             Finding::Unlike { correlation } => {
                 format!("another picture: its correlation with the reference is {correlation:.2}")
             }

@@ -3,17 +3,22 @@
 use super::{
     Reference,
     agreement::{NAMED, Radius, radius},
-    meaning::{SURE, explains, factor, is_as_near, is_different, left, proportion},
+    meaning::{SURE, explains, factor, is_as_near, is_different, is_display, left, proportion},
 };
 use crate::{
+    counted::counted,
     intake::Curve,
     layers::{code, linear},
     metrics::image::Encoding,
 };
-use std::fmt;
+use std::{collections::BTreeMap, fmt};
 
 /// References above this are open: there no AO is to be seen, whatever R is.
 const OPEN: f32 = 0.995;
+/// Times R: where that closes nothing either, nothing that a renderer does otherwise in the reach of R is to be seen.
+const WIDER: std::ops::RangeInclusive<f64> = 1.5..=4.0;
+/// Sides of the blocks whose means tell how far noise reaches.
+const BLOCK: usize = 16;
 /// So many pixels tell a level...
 const FEWEST: usize = 64;
 /// ... within this, and what noise leaves of it.
@@ -67,7 +72,6 @@ pub enum PairCause {
 impl PairCause {
     /// Whether the images may not be measured as they are: no renderer means AO to be so.
     pub fn is_wrong(&self) -> bool {
-        let is_display = |p: f64| (0.37..0.6).contains(&p);
         match self {
             PairCause::Exposure(_) | PairCause::Codes | PairCause::Decoded => true,
             PairCause::Power(power) => is_display(*power),
@@ -81,8 +85,9 @@ impl fmt::Display for PairCause {
         match self {
             PairCause::Exposure(gain) => write!(
                 f,
-                "exposure: where nothing occludes, the frame with AO is {gain:.2} times as bright as the one without it; \
-                 save both with the same exposure"
+                "exposure: where nothing occludes, the frame with AO is {gain:.*} times as bright as the one without it; \
+                 save both with the same exposure",
+                if (gain - 1.0).abs() < 0.1 { 3 } else { 2 }
             ),
             PairCause::Power(power) if self.is_wrong() => write!(
                 f,
@@ -115,7 +120,8 @@ impl fmt::Display for PairCause {
             ),
             PairCause::Cut { level, count } => write!(
                 f,
-                "light cut off at {level:.3}, as at {count} pixels of the frame without AO; save both darker, or as floats"
+                "light cut off at {level:.3}, as at {} of the frame without AO; save both darker, or as floats",
+                counted(*count, "pixel", "pixels")
             ),
             PairCause::Radius(factor) => write!(f, "R of {factor:.2} times what was asked for"),
         }
@@ -131,13 +137,11 @@ pub fn pair_causes(pair: &Pair<'_>, reference: &Reference, size: [usize; 2]) -> 
         return None;
     }
     let without = left(pair.ratio, like, size[0]);
+    let little = little(pair, reference, size[0]);
     if !is_different(without) {
-        // Where all is open there is no noise.
-        let level = open_level(pair.ratio, like);
-        let far = level.filter(|[level, error]| (level - 1.0).abs() > 2.0 * LEVEL + SURE * error);
-        return far.map(|[level, _]| vec![PairCause::Exposure(level)]);
+        return little.map(|cause| vec![cause]);
     }
-    let tried = tried(pair, like).into_iter().filter(|(_, ratio)| is_open_where(ratio, like));
+    let tried = tried(pair, like, size[0]).into_iter().filter(|(_, ratio)| is_open_where(ratio, like));
     let explained = tried.map(|(cause, ratio)| (cause, left(&ratio, like, size[0])));
     let other = radius(pair.ratio, reference, size[0]).filter(Radius::is_told);
     let other = other.map(|r| (PairCause::Radius(r.factor), r.left));
@@ -147,7 +151,7 @@ pub fn pair_causes(pair: &Pair<'_>, reference: &Reference, size: [usize; 2]) -> 
     let is_near = |left: [f64; 2]| if is_alone { left[0] < NAMED * without[0] } else { explains(left, without) };
     explained.extend(other.filter(|(_, left)| is_near(*left)));
     let Some(best) = explained.iter().map(|e| e.1).reduce(|a, b| if b[0] < a[0] { b } else { a }) else {
-        return Some(Vec::new());
+        return Some(little.into_iter().collect());
     };
     let fits = |left: [f64; 2]| is_as_near(left, best) || !is_different(left);
     let mut all: Vec<_> = explained.into_iter().filter(|(_, left)| fits(*left)).collect();
@@ -160,15 +164,57 @@ pub fn pair_causes(pair: &Pair<'_>, reference: &Reference, size: [usize; 2]) -> 
     Some(all.into_iter().map(|(cause, _)| cause).collect())
 }
 
+/// Exposure that differs by so little that AO hides it but where there is none, so that the ratio is as it should be or
+/// nothing else explains it.
+///
+/// There both frames show the same light, and their ratio is 1 but for noise that they do not share: of that the spread tells, of
+/// pixels and, since noise of filtered frames reaches over several, of blocks.
+fn little(pair: &Pair<'_>, reference: &Reference, width: usize) -> Option<PairCause> {
+    let like = &reference.openness;
+    let more = reference.scaled.iter().filter(|s| s.openness.len() == like.len() && WIDER.contains(&s.factor));
+    let more: Vec<&[f32]> = more.map(|s| s.openness.as_slice()).collect();
+    let is_open = |i: usize| more.iter().all(|openness| openness[i] > OPEN);
+    let wide = open_light(pair, like, width, &is_open).map(|found| (found, LEVEL));
+    let ([level, error], least) = wide.or_else(|| Some((open_light(pair, like, width, &|_| true)?, 2.0 * LEVEL)))?;
+    let undone: Vec<f32> = pair.ratio.iter().map(|v| v / level as f32).collect();
+    let is_it = (level - 1.0).abs() > least + SURE * error && !is_different(left(&undone, like, width));
+    is_it.then_some(PairCause::Exposure(level))
+}
+
+/// The light of the frame with AO over that of the one without it, over pixels that are open and of which `is_of` holds,
+/// and its standard error; None where these are hardly any. Of sums, since noise of the frame without AO would make the mean of
+/// ratios too large. The error is that of independent pixels or of independent blocks, whichever is larger.
+fn open_light(pair: &Pair<'_>, like: &[f32], width: usize, is_of: &dyn Fn(usize) -> bool) -> Option<[f64; 2]> {
+    let is_known = |i: &usize| pair.ratio[*i].is_finite() && like[*i] > OPEN && is_of(*i);
+    let open: Vec<usize> = (0..like.len()).filter(is_known).collect();
+    if open.len() < FEWEST {
+        return None;
+    }
+    let with = |i: usize| f64::from(pair.with[i]);
+    let without = |i: usize| f64::from(pair.without[i]) * f64::from(like[i]);
+    let all: f64 = open.iter().map(|&i| without(i)).sum();
+    let level = open.iter().map(|&i| with(i)).sum::<f64>() / all;
+    let (mut pixels, mut blocks) = (0.0, BTreeMap::new());
+    for &i in &open {
+        let beyond = with(i) - level * without(i);
+        pixels += beyond * beyond;
+        *blocks.entry((i / width / BLOCK, i % width / BLOCK)).or_insert(0.0) += beyond;
+    }
+    // The variance of a sum of parts that are independent, whose mean is 0.
+    let blocks: f64 = blocks.into_values().map(|sum: f64| sum * sum).sum();
+    Some([level, pixels.max(blocks).sqrt() / all])
+}
+
 /// The ratio as it would be without each of the causes.
-fn tried(pair: &Pair<'_>, like: &[f32]) -> Vec<(PairCause, Vec<f32>)> {
+fn tried(pair: &Pair<'_>, like: &[f32], width: usize) -> Vec<(PairCause, Vec<f32>)> {
     let of = |make: &dyn Fn(f32, f32, f32) -> f32| -> Vec<f32> {
         let pixels = pair.with.iter().zip(pair.without).zip(pair.ratio);
         pixels.map(|((a, b), r)| if r.is_finite() { make(*a, *b, *r) } else { f32::NAN }).collect()
     };
     let is_far = |v: f64| v.is_finite() && v.max(1.0 / v) > NEAR;
     let mut all = Vec::new();
-    let gain = open_level(pair.ratio, like).map_or_else(|| factor(pair.ratio, like), |[level, _]| level);
+    let open = open_light(pair, like, width, &|_| true);
+    let gain = open.map_or_else(|| factor(pair.ratio, like), |[level, _]| level);
     if is_far(gain) {
         all.push((PairCause::Exposure(gain), of(&|_, _, r| r / gain as f32)));
     }

@@ -375,7 +375,7 @@ fn outliers_and_black_images_are_told() {
         let is = matches!(found[..], [Finding::Range { scale: None, count: 1, farthest: [5, 2], .. }]);
         assert!(is && !found[0].is_doubt(), "{value}: {found:?}");
         let text = found[0].to_string();
-        assert!(text.contains("1 pixels are more than 1 beyond that, the farthest at column 5, row 2"), "{text}");
+        assert!(text.contains("1 pixel is more than 1 beyond that, the farthest at column 5, row 2"), "{text}");
         assert!(text.len() < 250, "{text}");
     }
     // As far on both sides it is no more than a warning, by whoever reads the file.

@@ -25,6 +25,7 @@ pub use scores::{Maps, Options, Score, ScoreName, Scores, scores};
 pub use ssim::{MS_SSIM_SIDE, SSIM_SIDE, Ssim, ms_ssim, ssim};
 pub use summary::{MapSummary, summary};
 
+use crate::counted::counted;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -122,7 +123,7 @@ pub enum ImageError {
         non_finite: usize,
     },
     /// Values that are no numbers, where a gate needs numbers.
-    #[error("NaN or infinity at {reference} pixels of the reference alone and {test} of the test image alone")]
+    #[error("NaN or infinity at {} of the reference alone and {test} of the test image alone", counted(*reference, "pixel", "pixels"))]
     NonFinite {
         /// Pixels of the reference whose test value is finite.
         reference: usize,

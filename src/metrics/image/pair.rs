@@ -149,7 +149,7 @@ mod tests {
         let pair = Pair::new(&a, &b, None).unwrap();
         assert_eq!(pair.non_finite(), NonFinite { reference: 1, test: 1, both: 1 });
         assert_eq!(pair.weights().unwrap(), [0.0, 0.0, 0.0, 1.0]);
-        assert!(pair.non_finite().check().unwrap_err().to_string().contains("1 pixels of the reference alone"));
+        assert!(pair.non_finite().check().unwrap_err().to_string().contains("1 pixel of the reference alone"));
         let masked = Pair::new(&a, &b, Some(&[1.0, 0.0, 0.0, 1.0])).unwrap();
         assert_eq!(masked.non_finite(), NonFinite { reference: 0, test: 0, both: 1 });
         assert!(masked.non_finite().check().is_ok());

@@ -4,7 +4,7 @@ use super::{
     Encoding, Exposures, ImageError, MapSummary, NonFinite, Pair, absolute_map, flip, flip::DEFAULT_PPD, hdr_flip,
     ms_ssim, pointwise, signed_map, ssim, summary,
 };
-use crate::metrics::Absent;
+use crate::{counted::counted, metrics::Absent};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -267,7 +267,7 @@ fn clamped(pair: &Pair<'_>) -> Option<String> {
     };
     let pixels = pair.reference().pixels();
     let n = (0..pixels).filter(|&i| pair.weight(i) > 0.0 && beyond(i)).count();
-    (n > 0).then(|| format!("{n} of {pixels} pixels lie beyond 0 to 1 and were clamped: see HDR-FLIP"))
+    (n > 0).then(|| format!("{n} of {} beyond 0 to 1 and clamped: see HDR-FLIP", counted(pixels, "pixel", "pixels")))
 }
 
 fn absent(e: &ImageError) -> Absent {

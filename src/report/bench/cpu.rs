@@ -1,20 +1,27 @@
 //! Rays a second, as tables.
 
-use crate::bench::cpu::{CpuBench, CpuRace, CpuScene, Kind};
+use crate::{
+    bench::cpu::{CpuBench, CpuRace, CpuScene, Kind},
+    counted::counted,
+};
 use std::fmt::Write as _;
+
+/// The heading of the page.
+pub const TITLE: &str = "Rays on the CPU";
 
 fn conditions(bench: &CpuBench) -> String {
     format!(
-        "{}, {}AVX2\nmillion rays a second of CPU time, by medians of {} rounds (by least times){}",
+        "{}, {}AVX2\nmillion rays a second of CPU time, by medians of {} (by least times){}",
         bench.processor.as_deref().unwrap_or("a processor without name"),
         if bench.has_avx2 { "" } else { "no " },
-        bench.rounds,
+        counted(bench.rounds, "round", "rounds"),
         if bench.has_embree { "; Embree 3.13: highest build quality, not robust unless named so" } else { "" }
     )
 }
 
 fn title(scene: &CpuScene) -> String {
-    format!("{}: {} triangles, {} points", scene.name, scene.triangles, scene.points)
+    let triangles = counted(scene.triangles, "triangle", "triangles");
+    format!("{}: {triangles}, {}", scene.name, counted(scene.points, "point", "points"))
 }
 
 fn name(race: &CpuRace) -> String {
@@ -56,7 +63,7 @@ pub fn plain(bench: &CpuBench) -> String {
 
 /// For a page.
 pub fn markdown(bench: &CpuBench) -> String {
-    let mut text = format!("# Rays on the CPU\n\n{}.\n", conditions(bench).replace('\n', ": "));
+    let mut text = format!("# {TITLE}\n\n{}.\n", conditions(bench).replace('\n', ": "));
     for scene in &bench.scenes {
         let _ = writeln!(text, "\n## {}\n\n{}.", scene.name, title(scene));
         let mut columns: Vec<&str> = vec![];

@@ -17,6 +17,11 @@ use plotters::{
 };
 use std::fmt::Write as _;
 
+/// How the heading of the profiles begins, by which such a file is known.
+pub const PROFILES_BEGIN: &str = "Openness; R = ";
+/// The same of the map.
+pub const MAP_BEGINS: &str = "Highlight contrast K; R = ";
+
 const GREY: RGBColor = RGBColor(90, 90, 90);
 
 /// The drawing library rounds places to whole units: a pixel has this many, so

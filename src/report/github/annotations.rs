@@ -1,8 +1,9 @@
 //! Annotations: lines by which GitHub's runner marks a run.
 
 use crate::{
+    counted::counted,
     gate::{Outcome, Verdict},
-    record::{Record, counted},
+    record::Record,
     report::{errors, in_a_line, table::margin},
     untrusted::{cut, line},
 };
@@ -121,10 +122,8 @@ fn gates(record: &Record, outcome: Outcome) -> Vec<(&str, Vec<&Verdict>)> {
 fn of_gate(level: Level, title: &str, of: &[&Verdict]) -> Annotation {
     let worst = of.iter().min_by(|a, b| margin(a).total_cmp(&margin(b)));
     let mut message = worst.map_or_else(String::new, |v| format!("{}: {}", v.subject(), in_a_line(v)));
-    match of.len() {
-        0 | 1 => {}
-        2 => message += " (and 1 more case)",
-        n => message += &format!(" (and {} more cases)", n - 1),
+    if of.len() > 1 {
+        message += &format!(" (and {})", counted(of.len() - 1, "more case", "more cases"));
     }
     Annotation::new(level, title, message)
 }

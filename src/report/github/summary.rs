@@ -2,6 +2,7 @@
 
 use super::ImageBase;
 use crate::{
+    counted::counted,
     gate::{Outcome, Verdict},
     record::{End, Record},
     report::{
@@ -52,11 +53,11 @@ fn head(record: &Record) -> String {
     };
     let machine = &record.machine;
     let mut text = format!(
-        "### {sign} {} · {}: {}\n\n{} cases with seed {} by aogauge {} on {}, {} {}; GPU: {}.\n",
+        "### {sign} {} · {}: {}\n\n{} with seed {} by aogauge {} on {}, {} {}; GPU: {}.\n",
         record.end().text(),
         cell(&record.suite.name),
         cell(&record.summary_line()),
-        record.cases.len(),
+        counted(record.cases.len(), "case", "cases"),
         record.seed,
         cell(&record.tool),
         cell(&machine.cpu),

@@ -6,8 +6,9 @@ mod rows;
 
 use super::{ReportError, definitions};
 use crate::{
+    counted::counted,
     disk::write_whole,
-    record::{Record, counted},
+    record::Record,
     viewer::{Page, Planes},
 };
 pub(crate) use pairs::SceneImages;

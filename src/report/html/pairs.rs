@@ -2,6 +2,7 @@
 
 use super::super::{ReportError, error_maps, layer, masked_q};
 use crate::{
+    counted::counted,
     golden::regions,
     layers::Layers,
     record::{CaseRecord, Record, SceneRecord},
@@ -76,7 +77,12 @@ impl<'a> SceneImages<'a> {
     pub(crate) fn pairs(&mut self, case: &CaseRecord, planes: &mut Planes) -> Result<Vec<Pair>, ReportError> {
         let Some(own) = self.mean(case)? else { return Ok(Vec::new()) };
         let mut pairs = Vec::new();
-        let name = format!("{}, {} rays x {}", case.case.estimator, case.case.rays, self.record.replicates(case));
+        let name = format!(
+            "{}, {} x {}",
+            case.case.estimator,
+            counted(case.case.rays, "ray", "rays"),
+            self.record.replicates(case)
+        );
         if let Some(q) = self.judged() {
             let terms = Terms {
                 label: "against Q, what the occluder does to the light".into(),
@@ -92,7 +98,7 @@ impl<'a> SceneImages<'a> {
             let converged = self.as_noisy_as(case, &own, values, rays);
             let terms = Terms {
                 label: "against its converged image".into(),
-                names: [name.clone(), format!("{}, {rays} rays, converged", case.case.estimator)],
+                names: [name.clone(), format!("{}, {}, converged", case.case.estimator, counted(rays, "ray", "rays"))],
                 limit: error_maps::LIMIT_CONVERGED,
                 note: "What is left of the noise, and what the renderer does to it. p-values take the converged image \
                        to be as noisy as that many rays of this case.",
@@ -104,7 +110,10 @@ impl<'a> SceneImages<'a> {
             let of = &other.case;
             let terms = Terms {
                 label,
-                names: [name.clone(), format!("{}, {}, {} rays", of.estimator, of.renderer, of.rays)],
+                names: [
+                    name.clone(),
+                    format!("{}, {}, {}", of.estimator, of.renderer, counted(of.rays, "ray", "rays")),
+                ],
                 limit: if of.estimator == case.case.estimator { error_maps::LIMIT_CONVERGED } else { LIMIT_METHODS },
                 note,
             };

@@ -7,6 +7,7 @@ use super::super::{
     table::{self, detectable_text, value_text},
 };
 use crate::{
+    counted::counted,
     gate::{CONFIDENCE, Outcome, Verdict},
     layers::Layers,
     record::{CaseRecord, End, Record, SceneRecord},
@@ -202,7 +203,10 @@ pub(super) fn facts(record: &Record) -> Vec<[String; 2]> {
         ["machine".to_owned(), format!("{}, {} {}", machine.cpu, machine.os, machine.arch)],
         ["GPU".to_owned(), machine.gpu.clone()],
         ["began".to_owned(), record.timing.began.clone()],
-        ["took".to_owned(), format!("{:.1} s on {} threads", record.timing.seconds, record.timing.threads)],
+        [
+            "took".to_owned(),
+            format!("{:.1} s on {}", record.timing.seconds, counted(record.timing.threads, "thread", "threads")),
+        ],
         ["replicates".to_owned(), record.suite.replicates.to_string()],
     ];
     facts.extend(record.scenes.iter().map(|s| [format!("scene {}", s.name), s.hash.chars().take(16).collect()]));

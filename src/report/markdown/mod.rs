@@ -20,10 +20,11 @@ use super::{
     table::{self, Row, outcome_text, plus_minus},
 };
 use crate::{
+    counted::counted,
     disk::DiskError,
     gate::{CONFIDENCE, Outcome},
     metrics::Metric,
-    record::{End, Record, counted, pictures},
+    record::{End, Record, pictures},
     untrusted,
 };
 use attention::Attention;
@@ -138,6 +139,7 @@ fn headline(record: &Record) -> (&'static str, &'static str) {
 fn replicates(record: &Record) -> String {
     let counts = || record.cases.iter().filter(|c| c.error.is_none()).map(|c| record.replicates(c));
     let seeds = "replicates with seeds of their own";
+    let alone = |n: u32| counted(n, "replicate", seeds);
     match (counts().min(), counts().max()) {
         (Some(least), Some(most)) if least < most && record.handed_in.is_some() => {
             format!("{least} to {most} images a case, as they were handed in")
@@ -146,8 +148,8 @@ fn replicates(record: &Record) -> String {
             format!("{least} to {most} {seeds}, each case as many as its verdicts took")
         }
         (Some(1), _) if record.handed_in.is_some() => "the tiles of one image a case".to_owned(),
-        (Some(least), _) => format!("{least} {seeds}"),
-        _ => format!("{} {seeds}", record.suite.replicates),
+        (Some(least), _) => alone(least),
+        _ => alone(record.suite.replicates),
     }
 }
 

@@ -14,6 +14,7 @@ use super::{
     overview, show,
 };
 use crate::{
+    counted::counted,
     disk::DiskError,
     gate::CONFIDENCE,
     metrics::{MetricName, artifact::Brighter, judge::Judge, regions::Region},
@@ -178,7 +179,7 @@ fn grids(record: &Record, scene: &SceneRecord, gallery: &Gallery) -> Result<[Opt
         ]));
         if let Some(case) = error_maps::fewest(record, scene, estimator) {
             let n = record.replicates(case);
-            let caption = format!("{estimator}, {} rays, mean of {n}", case.case.rays);
+            let caption = format!("{estimator}, {}, mean of {n}", counted(case.case.rays, "ray", "rays"));
             let pictures = vec![picture(caption.clone(), MINUS_CONVERGED)?];
             noise.push(Column { caption, pictures });
         }
@@ -216,7 +217,10 @@ pub(in crate::report) fn judge_text(scene: &SceneRecord) -> Option<String> {
     let judge = scene.judge.as_ref()?;
     let Some(contrast) = judge.contrast.estimate() else {
         let why = judge.contrast.note.as_deref().unwrap_or("K(Q) is not known");
-        return Some(format!("No contrast error is taken from it: {why}. {} paths a pixel.", judge.paths));
+        return Some(format!(
+            "No contrast error is taken from it: {why}. {} a pixel.",
+            counted(judge.paths, "path", "paths")
+        ));
     };
     let [lo, hi] = contrast.interval(CONFIDENCE);
     let reading = if lo > 0.0 {
@@ -243,11 +247,11 @@ pub(in crate::report) fn judge_text(scene: &SceneRecord) -> Option<String> {
         .collect();
     let precision = judge.precision.map_or_else(|| "unknown".to_owned(), |p| format!("{:.2} %", p * 100.0));
     Some(format!(
-        "K(Q) = {} against the {flank} flank: {reading}. Q: {}. {} replicates of {} paths a pixel, until {}; half width of the widest interval of a region mean: {precision}.",
+        "K(Q) = {} against the {flank} flank: {reading}. Q: {}. {} of {} a pixel, until {}; half width of the widest interval of a region mean: {precision}.",
         plus_minus(contrast.value, [lo, hi]),
         q.join(", "),
-        judge.replicates,
-        judge.paths,
+        counted(judge.replicates, "replicate", "replicates"),
+        counted(judge.paths, "path", "paths"),
         match judge.stopped {
             Stopped::Precise => "precise enough",
             Stopped::Budget => "the budget was spent",

@@ -8,6 +8,7 @@ use super::{
     style::{Fill, Style},
 };
 use crate::{
+    counted::counted,
     gate::CONFIDENCE,
     metrics::{convergence::Convergence, regions::Region},
     record::SceneRecord,
@@ -115,7 +116,13 @@ fn series(sheet: &mut Sheet, frame: &Frame, style: Style, c: &Convergence) {
     }
     for (p, at) in all.iter().zip(line) {
         frame.interval(sheet, f64::from(p.rays), p.interval, style.colour);
-        let tip = format!("{who}, {} rays: {:.3e} ({:.2e} to {:.2e})", p.rays, p.rmse, p.interval[0], p.interval[1]);
+        let tip = format!(
+            "{who}, {}: {:.3e} ({:.2e} to {:.2e})",
+            counted(p.rays, "ray", "rays"),
+            p.rmse,
+            p.interval[0],
+            p.interval[1]
+        );
         sheet.marker(at, style, fill, &tip);
     }
 }

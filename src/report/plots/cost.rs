@@ -8,6 +8,7 @@ use super::{
     style::{Fill, Style},
 };
 use crate::{
+    counted::counted,
     gate::CONFIDENCE,
     pooled::{Pool, Pooled},
     record::Record,
@@ -154,7 +155,7 @@ fn draw(sheet: &mut Sheet, frame: &Frame, estimators: &[String], points: &[Point
         }
         for (p, [x, y]) in own.into_iter().zip(line) {
             frame.interval(sheet, p.milliseconds, p.interval, style.colour);
-            let who = format!("{} on {}, {} rays", name(estimator), name(renderer), p.row.rays);
+            let who = format!("{} on {}, {}", name(estimator), name(renderer), counted(p.row.rays, "ray", "rays"));
             let [lo, hi] = p.interval;
             let tip = format!("{who}: {:.3} ms, {:.3e} ({lo:.2e} to {hi:.2e})", p.milliseconds, p.value);
             sheet.marker([x, y], style, fill, &tip);

@@ -45,7 +45,7 @@ function row(item, chosen) {
     el(
       "button",
       { type: "button", class: "row", "aria-current": chosen ? "true" : null, click: () => choose(item, true) },
-      el("span", { class: "row-head" }, badge(item.outcome), ...(item.origin ? [origin(item.origin)] : []), el("span", { class: "small" }, item.rays ? `${item.renderer}, ${item.rays} rays` : item.renderer)),
+      el("span", { class: "row-head" }, badge(item.outcome), ...(item.origin ? [origin(item.origin)] : []), el("span", { class: "small" }, item.rays ? `${item.renderer}, ${item.rays} ${item.rays === 1 ? "ray" : "rays"}` : item.renderer)),
       el("span", { class: "row-name" }, el("b", {}, item.scene), ` ${item.estimator}`),
       thumbnails,
     ),
@@ -56,9 +56,10 @@ function fillList() {
   shownItems = data.items.filter(passes);
   const list = byId("list");
   list.replaceChildren(...shownItems.map((item) => row(item, item === stage.item)));
+  const cases = `${data.items.length} ${data.items.length === 1 ? "case" : "cases"}`;
   byId("count").textContent = shownItems.length === data.items.length
-    ? `${data.items.length} cases`
-    : `${shownItems.length} of ${data.items.length} cases`;
+    ? cases
+    : `${shownItems.length} of ${cases}`;
   if (!shownItems.length) list.append(el("li", { class: "note" }, "No case passes the filters."));
 }
 

@@ -102,7 +102,7 @@ fn what_is_wrong_with_whole_frames_is_named() {
                 with[700] = f32::NAN;
                 [with, without]
             },
-            "1 pixels that see a surface hold NaN or infinity",
+            "1 pixel that sees a surface holds NaN or infinity",
         ),
     ];
     for (change, says) in cases {

@@ -202,7 +202,7 @@ fn own_gates_and_own_estimators() {
     let other = Images::new();
     other.exr("corner.my-ao.4.0000.exr", &replicates[0], size);
     let (code, text) = other.score(&[]);
-    assert!(code == 4 && text.contains("none of 1 images is taken") && text.contains("--estimator"), "{code}: {text}");
+    assert!(code == 4 && text.contains("the one image is not taken") && text.contains("--estimator"), "{code}: {text}");
 }
 
 /// A gate that no scene of the kit could ever be held against is a mistake.

@@ -14,7 +14,7 @@ fn a_wrong_self_check_ends_it_at_once() {
         (|i, _| i.iter().map(|v| 2.0 * v - 1.0).collect(), "negative openness"),
         (
             |i, _| i.iter().enumerate().map(|(k, v)| if k == 777 { f32::INFINITY } else { *v }).collect(),
-            "infinity: 1 pixels",
+            "infinity: 1 pixel that sees a surface holds",
         ),
         (|i, _| i.iter().enumerate().map(|(k, v)| if k == 777 { f32::NAN } else { *v }).collect(), "NaN"),
     ];

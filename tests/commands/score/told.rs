@@ -96,7 +96,7 @@ fn a_single_pixel_out_of_range_is_named() {
         images.exr("corner.classic.4.0002.exr", &far, size);
         let (code, text) = images.score(&[]);
         assert_eq!(code, if is_wrong { 5 } else { 0 }, "{value}: {text}");
-        let warns = "openness lies outside 0 to 1 at 1 pixels: ";
+        let warns = "openness lies outside 0 to 1 at 1 pixel: ";
         assert!(text.contains(warns) && text.contains("farthest at column 3, row 1"), "{value}: {text}");
         assert!(text.lines().all(|l| !l.contains("00000000")), "{value}: {text}");
         let error = case(&images.record(), "corner", "classic").error.clone();
@@ -144,8 +144,8 @@ fn the_kit_is_named_and_another_is_refused() {
 fn the_self_check_tells_what_is_wrong_with_frames() {
     type Make = fn(f32, f32) -> [f32; 2];
     let cases: [(Make, i32, &str); 6] = [
-        (|a, l| [0.97 * a * l, l], 5, "the frame with AO is 0.97 times as bright as the one without it"),
-        (|a, l| [0.92 * a * l, l], 5, "the frame with AO is 0.92 times as bright as the one without it"),
+        (|a, l| [0.97 * a * l, l], 5, "the frame with AO is 0.970 times as bright as the one without it"),
+        (|a, l| [0.92 * a * l, l], 5, "the frame with AO is 0.920 times as bright as the one without it"),
         (|a, l| [(2.0 * a * l).min(0.95), (2.0 * l).min(0.95)], 5, "light cut off at 0.950"),
         (|a, l| [a * l / (a * l + 0.5), l / (l + 0.5)], 5, "a tone curve"),
         (|a, l| [0.3 + a * l, 0.3 + l], 5, "light that AO does not dim, 0.300 in both frames"),
