@@ -47,7 +47,7 @@ impl Entry<'_> {
         let entry = Some((self.stage, self.name.to_owned()));
         let pipeline = msl::PipelineOptions { entry_point: entry, ..Default::default() };
         let (text, told) = msl::write_string(&self.module, &self.info, &options, &pipeline).unwrap();
-        assert!(told.entry_point_names.iter().all(|n| n.is_ok()), "{}", self.name);
+        assert!(told.entry_point_names.iter().all(Result::is_ok), "{}", self.name);
         text
     }
 
@@ -64,7 +64,7 @@ impl Entry<'_> {
         let pipeline = hlsl::PipelineOptions { entry_point: Some((self.stage, self.name.to_owned())) };
         let mut text = String::new();
         let told = hlsl::Writer::new(&mut text, &options, &pipeline).write(&self.module, &self.info, None).unwrap();
-        assert!(told.entry_point_names.iter().all(|n| n.is_ok()), "{}", self.name);
+        assert!(told.entry_point_names.iter().all(Result::is_ok), "{}", self.name);
         text
     }
 
