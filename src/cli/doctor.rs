@@ -41,6 +41,8 @@ struct Findings {
     why: Option<String>,
     /// Why there is none.
     missing: Option<String>,
+    /// The adapter that would be used but cannot be opened.
+    refused: Option<String>,
     /// What is wrong with the one that is used.
     trouble: Option<String>,
     adapters: Vec<Adapter>,
@@ -68,8 +70,13 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
 
 impl Findings {
     fn here() -> Self {
-        let adapters = survey();
+        let mut adapters = survey();
         let gpu = Gpu::open();
+        let refused = if gpu.is_err() { adapters.iter_mut().find(|a| a.used) } else { None };
+        let refused = refused.map(|chosen| {
+            chosen.used = false;
+            chosen.name.clone()
+        });
         let trouble = gpu.as_ref().ok().and_then(|gpu| trial(gpu).err());
         let found = gpu.as_ref().ok();
         let software = found.map(Gpu::is_software);
@@ -98,8 +105,12 @@ impl Findings {
             why: found.and_then(|_| why(&adapters)),
             missing: gpu.as_ref().err().map(ToString::to_string),
             trouble,
-            advice: advice(&adapters, System::here(), &Maker::here(), &narrowed()),
+            advice: match &refused {
+                Some(name) => vec![instead_of(name, &adapters)],
+                None => advice(&adapters, System::here(), &Maker::here(), &narrowed()),
+            },
             adapters,
+            refused,
             judge_cache: JudgeCache::folder_of_user().map(|folder| {
                 let (files, bytes) = judge_cache::usage(&folder);
                 Cache { folder: folder.display().to_string(), files, bytes, most_bytes: judge_cache::MOST }
@@ -131,7 +142,7 @@ impl Findings {
         page.entry("cache", &cache);
         for (i, adapter) in self.adapters.iter().enumerate() {
             page.0.push('\n');
-            page.adapter(i + 1, adapter);
+            page.adapter(i + 1, adapter, self.refused.as_deref());
         }
         for (i, advice) in self.advice.iter().enumerate() {
             if i == 0 {
@@ -171,9 +182,10 @@ impl Page {
         self.0.push('\n');
     }
 
-    fn adapter(&mut self, number: usize, a: &Adapter) {
+    fn adapter(&mut self, number: usize, a: &Adapter, refused: Option<&str>) {
         let use_of_it = match (a.used, a.wanted) {
             (true, _) => ", used",
+            (false, true) if refused == Some(&a.name) => ", chosen, but cannot be opened",
             (false, true) => "",
             (false, false) => ", passed over: WGPU_ADAPTER_NAME asks for another",
         };
@@ -266,6 +278,16 @@ fn why(adapters: &[Adapter]) -> Option<String> {
         true => format!("chosen because {choice}; WGPU_BACKEND and WGPU_ADAPTER_NAME would narrow the choice"),
         false => format!("chosen because {choice} that {} leaves", narrowed.join(" with ")),
     })
+}
+
+/// What to do about an adapter that cannot be opened.
+fn instead_of(refused: &str, adapters: &[Adapter]) -> String {
+    let mend =
+        format!("the CPU renders without; the driver of {refused} answers but does not work: reinstall or update it");
+    match adapters.iter().find(|a| a.name != refused) {
+        Some(other) => format!("{mend}, or set WGPU_ADAPTER_NAME to the name of another, such as '{}'", other.name),
+        None => mend,
+    }
 }
 
 /// The variables that narrow the choice, as they are set.

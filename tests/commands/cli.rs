@@ -621,6 +621,46 @@ fn without_an_adapter_the_doctor_says_what_to_install() {
     }
 }
 
+/// Mesa's AMD driver gives an adapter without hardware, which compiles shaders and
+/// runs nothing.
+#[test]
+fn an_adapter_that_cannot_be_opened_is_said_to_be_so() {
+    let null = [("RADV_FORCE_FAMILY", "navi21"), ("WGPU_BACKEND", "vulkan")];
+    let (page, json) = doctor(&null);
+    let name = json["adapters"][0]["name"].as_str().unwrap();
+    if !name.contains("Null hardware") {
+        return; // No such driver here.
+    }
+    assert!(page.starts_with("aogauge ") && page.lines().next().unwrap().contains("no GPU: the CPU renders"), "{page}");
+    assert!(page.contains(&format!("{name}, chosen, but cannot be opened")) && !page.contains(", used"), "{page}");
+    assert!(
+        json["refused"] == name && json["adapters"].as_array().unwrap().iter().all(|a| a["used"] == false),
+        "{json}"
+    );
+    let advice = json["advice"][0].as_str().unwrap();
+    assert!(advice.contains("reinstall or update") && advice.contains("WGPU_ADAPTER_NAME"), "{advice}");
+    let render = |renderer: &str| {
+        let dir = tempfile::tempdir().unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_aogauge"));
+        command.args([
+            "render",
+            "plane",
+            "--renderer",
+            renderer,
+            "--rays",
+            "1",
+            "--out",
+            text(&dir.path().join("a.png")),
+        ]);
+        command.env_remove("WGPU_ADAPTER_NAME").envs(null).output().unwrap()
+    };
+    let failed = render("gpu");
+    let said = String::from_utf8_lossy(&failed.stderr);
+    assert!(!failed.status.success() && said.contains(name) && said.contains("cannot be opened"), "{said}");
+    assert!(!said.contains("panicked"), "{said}");
+    assert!(render("cpu").status.success());
+}
+
 #[test]
 fn every_verb_shows_an_example() {
     let verbs: [&[&str]; 14] = [

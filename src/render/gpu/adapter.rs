@@ -80,7 +80,7 @@ pub struct Adapter {
     pub backend: String,
     /// The driver and its version.
     pub driver: String,
-    /// Whether aogauge computes on it.
+    /// Whether aogauge chooses it.
     pub used: bool,
     /// Whether its name is as `WGPU_ADAPTER_NAME` asks.
     pub wanted: bool,
