@@ -372,7 +372,7 @@ fn what_is_another_thing_is_not_compared() {
     let method = edited("method", |r| {
         r["suite"]["methods"]["classic"]["intensity"] = json!(2.0);
         for case in items(r, "cases") {
-            items(case, "metrics").iter_mut().for_each(|m| m["value"] = json!(7.0));
+            items(case, "metrics").iter_mut().for_each(|m| m["value"] = json!(0.5));
         }
     });
     let all = found(0, &RUNS.out[0], &method, &[]);
