@@ -72,8 +72,7 @@ impl Findings {
     fn here() -> Self {
         let mut adapters = survey();
         let gpu = Gpu::open();
-        let refused = if gpu.is_err() { adapters.iter_mut().find(|a| a.used) } else { None };
-        let refused = refused.map(|chosen| {
+        let refused = adapters.iter_mut().find(|a| a.used && gpu.is_err()).map(|chosen| {
             chosen.used = false;
             chosen.name.clone()
         });
@@ -135,8 +134,8 @@ impl Findings {
         let cache = self.judge_cache.as_ref().map_or_else(
             || "no folder of the user's for it: the judge is traced anew in every run".to_owned(),
             |c| {
-                let files = if c.files == 1 { "file" } else { "files" };
-                format!("{}: {} {files}, {} of at most {}", c.folder, c.files, bytes(c.bytes), bytes(c.most_bytes))
+                let files = counted(c.files, "file", "files");
+                format!("{}: {files}, {} of at most {}", c.folder, bytes(c.bytes), bytes(c.most_bytes))
             },
         );
         page.entry("cache", &cache);

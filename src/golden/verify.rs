@@ -160,6 +160,11 @@ impl Checked {
         format!("{text}{others}{unreadable}{rejected}")
     }
 
+    /// Whether a golden of the case holds and all of them can be read.
+    pub fn is_whole(&self) -> bool {
+        self.outcome() == Outcome::Pass && self.unreadable.is_empty()
+    }
+
     /// Goldens that cannot be read, beside the one that the verdict is of.
     pub fn unreadable_beside(&self) -> impl Iterator<Item = &Unreadable> {
         self.unreadable.iter().filter(|u| u.golden != self.golden)
@@ -283,7 +288,7 @@ fn misfit(golden: &Golden, path: &Path, record: &Record, case: &CaseRecord, imag
         return Some(format!(
             "{at}: the golden is of {} at {}, not what its name says",
             identity.estimator,
-            counted(identity.rays as usize, "ray", "rays")
+            counted(identity.rays, "ray", "rays")
         ));
     }
     if identity.resolution != image.resolution {

@@ -105,8 +105,7 @@ impl Review {
     pub fn shown(&self) -> impl Iterator<Item = (&Checked, &CaseRecord)> {
         let decided = |id: &str| self.decisions.iter().any(|(case, _)| case == id);
         let cases = self.found.cases.iter();
-        let is_whole = |c: &Checked| c.outcome() == Outcome::Pass && c.unreadable.is_empty();
-        let shown = cases.filter(move |c| self.all || !is_whole(c) || decided(&c.case));
+        let shown = cases.filter(move |c| self.all || !c.is_whole() || decided(&c.case));
         shown.filter_map(|c| Some((c, golden_cases(&self.record).find(|r| r.case.id() == c.case)?)))
     }
 
@@ -161,11 +160,10 @@ impl Review {
         let found = self.found.cases.iter().find(|c| c.case == case);
         match found.map(Checked::outcome) {
             _ if rejected => "fail",
-            Some(Outcome::Pass) if found.is_some_and(|c| !c.unreadable.is_empty()) => "warn",
-            Some(Outcome::Pass) => "pass",
+            Some(Outcome::Pass) if found.is_some_and(Checked::is_whole) => "pass",
+            Some(Outcome::Pass | Outcome::Missing) => "warn",
             Some(Outcome::Fail) => "fail",
             Some(Outcome::Blind) => "inconclusive",
-            Some(Outcome::Missing) => "warn",
             Some(Outcome::Lost) | None => "error",
         }
     }

@@ -102,7 +102,7 @@ fn item(
             ["accepted from".to_owned(), format!("{}, {}, aogauge {}", from.renderer, from.device, from.tool)],
             [
                 "its sample".to_owned(),
-                format!("{}, seed {}", counted(from.replicates as usize, "replicate", "replicates"), from.seed),
+                format!("{}, seed {}", counted(from.replicates, "replicate", "replicates"), from.seed),
             ],
         ]);
     }
