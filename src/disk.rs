@@ -1,6 +1,7 @@
 //! Files that are whole or not there at all: writes go to a temporary name in the
 //! same folder, then are renamed.
 
+use crate::untrusted::{cut, line};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::{
     fs,
@@ -150,13 +151,33 @@ pub(crate) fn read_json<T: DeserializeOwned>(path: &Path, reads: u32, what: &str
         version: u32,
     }
     let text = read_text(path)?;
-    let malformed = |e: serde_json::Error| DiskError::content(path, format!("not {what}: {e}"));
-    let Versioned { version } = serde_json::from_str(&text).map_err(malformed)?;
+    let malformed = |e: String| DiskError::content(path, format!("not {what}: {e}"));
+    let Versioned { version } = parse_json(&text).map_err(malformed)?;
     if version != reads {
         let why = format!("{it_is} of version {version}, this tool reads version {reads}");
         return Err(DiskError::content(path, why));
     }
-    serde_json::from_str(&text).map_err(malformed)
+    parse_json(&text).map_err(malformed)
+}
+
+/// Reads JSON. An error names the field that it is of, on one line: it may hold words of the file.
+///
+/// All that is large is read by this one reader: each other one is compiled anew for every type of
+/// a record, which took a minute of each build.
+///
+/// # Errors
+/// Where it is malformed, or not of this type.
+pub(crate) fn parse_json<'a, T: Deserialize<'a>>(text: &'a str) -> Result<T, String> {
+    let told = |e: &str| cut(&line(e), 500).into_owned();
+    let mut json = serde_json::Deserializer::from_str(text);
+    let value = serde_path_to_error::deserialize(&mut json).map_err(|e| {
+        let field = e.path().to_string();
+        // Of the whole, such as a field that is missing.
+        let at = if field == "." { String::new() } else { format!("{field}: ") };
+        told(&format!("{at}{}", e.into_inner()))
+    })?;
+    json.end().map_err(|e| told(&e.to_string()))?;
+    Ok(value)
 }
 
 /// Reads a text file.

@@ -1,7 +1,7 @@
 //! The folder of a record, while a run fills it.
 
 use super::{BEGUN, FILE, Record};
-use crate::disk::{DiskError, is_part, read_text, write_whole};
+use crate::disk::{DiskError, is_part, parse_json, read_text, write_whole};
 use std::{
     fs, io,
     path::{Path, PathBuf},
@@ -137,10 +137,10 @@ impl RecordFolder {
     /// Where it cannot be written.
     pub fn commit(&self, record: &Record) -> Result<(), DiskError> {
         let path = self.path.join(FILE);
-        let unfit = |e: serde_json::Error| DiskError::content(&path, format!("the record cannot be written: {e}"));
-        let text = serde_json::to_string_pretty(record).map_err(unfit)?;
+        let unfit = |e: String| DiskError::content(&path, format!("the record cannot be written: {e}"));
+        let text = serde_json::to_string_pretty(record).map_err(|e| unfit(e.to_string()))?;
         // JSON has no NaN and no infinity: what could not be read must not look whole.
-        serde_json::from_str::<Record>(&text).map_err(unfit)?;
+        parse_json::<Record>(&text).map_err(unfit)?;
         write_whole(&path, |buffer| io::Write::write_all(buffer, format!("{text}\n").as_bytes()))?;
         if record.incomplete.is_some() {
             return Ok(());

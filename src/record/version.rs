@@ -10,10 +10,12 @@
 //! in the JSON before it is read.
 
 use super::{OLDEST, Record, VERSION};
-use crate::untrusted::{cut, line};
-use serde::{Deserialize, Deserializer};
+use crate::{
+    disk::parse_json,
+    untrusted::{cut, line},
+};
+use serde::Deserialize;
 use serde_json::{Value, json};
-use std::fmt::Display;
 
 /// Reads the text of a `record.json` of any version since [`OLDEST`].
 pub(super) fn parse(text: &str) -> Result<Record, String> {
@@ -23,21 +25,15 @@ pub(super) fn parse(text: &str) -> Result<Record, String> {
         #[serde(default)]
         tool: Option<String>,
     }
-    // The error may name a field as the file has it.
-    let malformed = |e: serde_json::Error| format!("not a record: {}", cut(&line(&e.to_string()), 500));
-    let Versioned { version, tool } = serde_json::from_str(text).map_err(malformed)?;
+    let malformed = |e: String| format!("not a record: {e}");
+    let Versioned { version, tool } = parse_json(text).map_err(malformed)?;
     let by = tool.map_or_else(String::new, |t| format!(" {}", cut(&line(&t), 40)));
     match version {
-        VERSION => {
-            let mut json = serde_json::Deserializer::from_str(text);
-            let record = by_field(&mut json)?;
-            json.end().map_err(malformed)?;
-            Ok(record)
-        }
+        VERSION => parse_json(text).map_err(malformed),
         OLDEST => {
-            let mut record: Value = serde_json::from_str(text).map_err(malformed)?;
+            let mut record: Value = parse_json(text).map_err(malformed)?;
             from_3(&mut record);
-            by_field(record)
+            parse_json(&record.to_string()).map_err(malformed)
         }
         v if v > VERSION => Err(format!(
             "written by a newer aogauge{by} (record version {v}); this one reads versions {OLDEST} to {VERSION}: update it"
@@ -47,19 +43,6 @@ pub(super) fn parse(text: &str) -> Result<Record, String> {
              suite again"
         )),
     }
-}
-
-/// Errors name the field that they are of, as the file has it.
-fn by_field<'de, D: Deserializer<'de>>(json: D) -> Result<Record, String>
-where
-    D::Error: Display,
-{
-    serde_path_to_error::deserialize(json).map_err(|e| {
-        let field = e.path().to_string();
-        // Of the record itself, such as a field that is missing.
-        let at = if field == "." { String::new() } else { format!("{field}: ") };
-        format!("not a record: {}", cut(&line(&format!("{at}{}", e.into_inner())), 500))
-    })
 }
 
 /// Version 3 had the p-value of equivalence alone, each verdict a family of its own.
