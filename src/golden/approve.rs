@@ -122,7 +122,9 @@ pub fn sampled(folder: &Path, record: &Record, case: &CaseRecord) -> Result<Samp
     let method = record.suite.methods.get(&case.case.estimator);
     let depends = method.is_some_and(|m| m.temporal.is_some() || m.denoise.is_some());
     let layers = case.layers(folder)?;
-    Sampled::of_layers((&path, &layers), record.replicates(case), case.case.rays, record.seed, depends)
+    // Other programs draw numbers of their own, whatever seed they are given.
+    let seed = (!case.case.is_external()).then_some(record.seed);
+    Sampled::of_layers((&path, &layers), record.replicates(case), case.case.rays, seed, depends)
 }
 
 impl Store {

@@ -12,13 +12,14 @@
 //! that was cut short can be made again from its beginning, whatever was done to the
 //! files in the store meanwhile: `git checkout` of them, above all.
 
+use super::Slot;
 use crate::disk::{DiskError, is_part, read_text, write_whole};
 use serde::{Deserialize, Serialize};
 use std::{
     collections::BTreeSet,
     fs::{self, File, TryLockError},
     io::{self, Write},
-    path::{Component, Path, PathBuf},
+    path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
@@ -131,10 +132,7 @@ impl Journal {
         let journal: Journal = serde_json::from_str(&read_text(&path)?)
             .map_err(|e| DiskError::content(&path, format!("this is no journal of aogauge: {e}")))?;
         // A store may come from anybody: nothing it says leads out of it.
-        let is_golden = |p: &Path| {
-            p.components().count() == 2
-                && p.components().all(|c| matches!(c, Component::Normal(n) if !n.to_string_lossy().starts_with('.')))
-        };
+        let is_golden = |p: &Path| Slot::of_path(p).is_some();
         let is_staged = |n: &str| n.strip_suffix(".exr").is_some_and(|n| n.bytes().all(|b| b.is_ascii_digit()));
         let fits = journal.moves.iter().all(|(from, to)| is_staged(from) && is_golden(to))
             && journal.removals.iter().all(|r| is_golden(r));
@@ -150,13 +148,15 @@ impl Journal {
     /// Where one is not: what the change was decided to be cannot be known any more.
     fn check_staged(&self, store: &Path) -> Result<(), DiskError> {
         let folder = staged(store);
-        let Some((gone, _)) = self.moves.iter().find(|(from, _)| !folder.join(from).is_file()) else {
+        // Nor is a link one: it would bring a file of somewhere else into the store.
+        let is_there = |name: &String| fs::symlink_metadata(folder.join(name)).is_ok_and(|meta| meta.is_file());
+        let Some((gone, _)) = self.moves.iter().find(|(from, _)| !is_there(from)) else {
             return Ok(());
         };
         Err(DiskError::content(
             &folder.join(gone),
             format!(
-                "a change of the goldens was interrupted, and this file of it is gone: remove {} to give the change up, \
+                "a change of the goldens was interrupted, and this file of it is gone or none: remove {} to give the change up, \
                  and restore the goldens from version control",
                 store.join(FOLDER).display()
             ),
@@ -167,6 +167,10 @@ impl Journal {
     /// begun again, whatever lies in the places of the goldens meanwhile.
     fn apply(&self, store: &Path) -> Result<(), DiskError> {
         self.check_staged(store)?;
+        let changed = self.moves.iter().map(|(_, to)| to).chain(&self.removals);
+        changed
+            .filter_map(|file| store.join(file).parent().map(Path::to_owned))
+            .try_for_each(|scene| refuse_link(&scene))?;
         let mut scenes = BTreeSet::new();
         for (from, to) in &self.moves {
             let to = store.join(to);
@@ -210,8 +214,11 @@ impl Overlay {
 impl Change {
     pub(super) fn begin(store: &Path, told: &dyn Fn(Notice)) -> Result<Self, DiskError> {
         let folder = store.join(FOLDER);
-        fs::create_dir_all(&folder).map_err(DiskError::io(&folder, "create the folder"))?;
         let path = lock_path(store);
+        for ours in [&folder, &path, &staged(store)] {
+            refuse_link(ours)?;
+        }
+        fs::create_dir_all(&folder).map_err(DiskError::io(&folder, "create the folder"))?;
         let mut open = File::options();
         let file = open.create(true).truncate(false).write(true).open(&path);
         let lock = file.map_err(DiskError::io(&path, "open the store's lock"))?;
@@ -290,11 +297,25 @@ fn place(store: &Path, from: &Path, to: &Path, scene: &Path) -> Result<(), DiskE
     let part = store.join(FOLDER).join(PLACING);
     let action = "put the golden in its place";
     fs::create_dir_all(scene).map_err(DiskError::io(scene, "create the folder"))?;
-    fs::copy(from, &part).map_err(DiskError::io(&part, action))?;
-    // Opened for writing: some systems sync nothing else.
-    let copied = File::options().write(true).open(&part).and_then(|f| f.sync_all());
+    // The bytes alone: a golden is no program, whatever its staged file says.
+    let copied = File::create(&part).and_then(|mut golden| {
+        io::copy(&mut File::open(from)?, &mut golden)?;
+        golden.sync_all()
+    });
     copied.map_err(DiskError::io(&part, action))?;
     fs::rename(&part, to).map_err(DiskError::io(to, action))
+}
+
+/// Refuses a link where the store has a folder or file of its own: a store may come from anybody, and what
+/// is written through a link lies somewhere else.
+fn refuse_link(path: &Path) -> Result<(), DiskError> {
+    match fs::symlink_metadata(path) {
+        Ok(meta) if meta.is_symlink() => Err(DiskError::content(
+            path,
+            "this is a link, and a store of goldens is changed in its own folders alone: put the folder in its place",
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// Removes what was being written when its writer was killed.
@@ -410,6 +431,8 @@ mod tests {
             r#"{"moves":[["../../x.exr","s/a.4.exr"]],"removals":[]}"#,
             r#"{"moves":[["0.exr","../a.4.exr"]],"removals":[]}"#,
             r#"{"moves":[["0.exr","/etc/a.4.exr"]],"removals":[]}"#,
+            r#"{"moves":[["0.exr","s/post-checkout"]],"removals":[]}"#,
+            r#"{"moves":[],"removals":["s/notes.txt"]}"#,
             r#"{"moves":[],"removals":["../victim"]}"#,
             r#"{"moves":[],"removals":[".approval/lock"]}"#,
             "no journal",
@@ -420,6 +443,48 @@ mod tests {
             assert!(store.change(&|_| ()).is_err(), "{journal}");
             assert!(dir.path().join("victim").exists());
         }
+    }
+
+    /// Version control carries links and modes, so a store may hold any.
+    #[cfg(unix)]
+    #[test]
+    fn nothing_is_written_through_links_and_no_golden_is_a_program() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        let begun = |scene: Option<&Path>| {
+            let dir = tempfile::tempdir().unwrap();
+            let store = Store::new(&dir.path().join("store"));
+            two(&store, 1.0).decide().unwrap();
+            if let Some(place) = scene {
+                fs::create_dir(dir.path().join("elsewhere")).unwrap();
+                symlink(dir.path().join("elsewhere"), store.folder().join(place)).unwrap();
+            }
+            (dir, store)
+        };
+        let (dir, store) = begun(Some(Path::new("s")));
+        let error = store.change(&|_| ()).unwrap_err().to_string();
+        assert!(error.contains("this is a link"), "{error}");
+        assert_eq!(fs::read_dir(dir.path().join("elsewhere")).unwrap().count(), 0);
+        // What is staged is a link to a file of somebody else.
+        let (dir, store) = begun(None);
+        fs::write(dir.path().join("secret"), image(7.0)).unwrap();
+        let first = staged(store.folder()).join("0.exr");
+        fs::remove_file(&first).unwrap();
+        symlink(dir.path().join("secret"), &first).unwrap();
+        assert!(store.change(&|_| ()).unwrap_err().to_string().contains("0.exr"));
+        assert!(store.reading(|_| ()).is_err());
+        // The folder of the change itself.
+        let dir = tempfile::tempdir().unwrap();
+        fs::create_dir_all(dir.path().join("elsewhere/staged")).unwrap();
+        fs::create_dir(dir.path().join("store")).unwrap();
+        symlink(dir.path().join("elsewhere"), dir.path().join("store").join(FOLDER)).unwrap();
+        assert!(Store::new(&dir.path().join("store")).change(&|_| ()).is_err());
+        assert!(dir.path().join("elsewhere/staged").exists(), "nothing was cleared there");
+        let (_dir, store) = begun(None);
+        let first = staged(store.folder()).join("0.exr");
+        fs::set_permissions(&first, fs::Permissions::from_mode(0o755)).unwrap();
+        drop(store.change(&|_| ()).unwrap());
+        let mode = fs::metadata(store.folder().join("s/a.4.exr")).unwrap().permissions().mode();
+        assert_eq!(mode & 0o111, 0, "{mode:o}");
     }
 
     #[test]

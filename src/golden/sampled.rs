@@ -23,7 +23,7 @@ pub struct Sampled {
     pub replicates: u32,
     /// Primary rays a pixel in each; 0 where values are continuous.
     pub rays: u32,
-    /// Seed of the replicates; None where it is not known.
+    /// Seed of the replicates; None where it is not known, or where their random numbers are not ours.
     pub seed: Option<u32>,
 }
 
@@ -105,7 +105,7 @@ impl Sampled {
         (path, layers): (&Path, &Layers),
         replicates: u32,
         rays: u32,
-        seed: u32,
+        seed: Option<u32>,
         depends: bool,
     ) -> Result<Self, DiskError> {
         let tiles = if depends {
@@ -126,7 +126,7 @@ impl Sampled {
             tiles,
             replicates,
             rays,
-            seed: Some(seed),
+            seed,
         })
     }
 

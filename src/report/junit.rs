@@ -12,7 +12,7 @@
 //! |---|---|
 //! | pass, warn | passed; a warning's reason is its output |
 //! | fail | failure of type `fail` |
-//! | inconclusive, a gate idle without excuse | failure of type `inconclusive` |
+//! | inconclusive, a gate idle without excuse, gates of which none speaks of what was handed in | failure of type `inconclusive` |
 //! | known failure, an excused idle gate | skipped, with the reason |
 //! | a case or judge that ended with an error, a run that ended early | error |
 //!
@@ -59,6 +59,10 @@ fn of_run(record: &Record) -> TestSuite {
     let complete = record.incomplete.as_ref().map(|why| error("incomplete", why));
     let mut tests = vec![TestCase::new("the run is complete", complete.unwrap_or_else(TestCaseStatus::success))];
     let excuse = record.end() != End::Nothing;
+    if !excuse && record.idle_gates.is_empty() {
+        let nothing = failure("inconclusive", "no gate speaks of the images that were handed in", &[]);
+        tests.push(TestCase::new("gates are held against the images", nothing));
+    }
     tests.extend(record.idle_gates.iter().map(|g| TestCase::new(line(&g.gate), of_idle(g, excuse))));
     for mut test in tests {
         test.set_classname(line(&record.suite.name)).set_time(Duration::ZERO);

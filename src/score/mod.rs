@@ -14,7 +14,7 @@ use crate::{
     counted::counted,
     disk::DiskError,
     intake::{self, Defaults, Handed, IntakeError},
-    record::{HandedIn, UndoneCurve},
+    record::{HandedIn, Shows, UndoneCurve},
     run::{CaseImages, References, ReferencesError},
     suite::{Case, is_taken},
 };
@@ -323,7 +323,8 @@ fn undo_curve(
         Some(CurveChoice::Fit(_)) => fit(cases, references)?,
     };
     for case in cases {
-        if case.is_openness()
+        // A pair's ratio is openness as well, by the same curve.
+        if case.shows() != Shows::Frame
             && let Ok(images) = &mut case.images
         {
             for image in images {

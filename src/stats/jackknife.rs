@@ -1,6 +1,6 @@
 //! Intervals of functions of means, by the delete-one jackknife.
 
-use super::{Estimate, mean_variance};
+use super::{Estimate, mean, mean_variance};
 
 /// Independent replicates of one experiment: a row a replicate, a column a
 /// quantity measured in it. Quantities of a row may depend on each other, rows
@@ -8,8 +8,7 @@ use super::{Estimate, mean_variance};
 pub type Group = Vec<Vec<f64>>;
 
 pub(crate) fn column_means(rows: &Group) -> Vec<f64> {
-    let n = rows.len() as f64;
-    (0..rows.first().map_or(0, Vec::len)).map(|c| rows.iter().map(|r| r[c]).sum::<f64>() / n).collect()
+    (0..rows.first().map_or(0, Vec::len)).map(|c| mean(rows.iter().map(|r| r[c]))).collect()
 }
 
 /// Estimates `f(means of group 1, means of group 2, ...)`.

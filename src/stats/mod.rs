@@ -55,10 +55,18 @@ pub struct Estimate {
     pub df: f64,
 }
 
-/// Mean and unbiased variance of two values or more; the variance of fewer is NaN.
+/// The mean, measured from the first value: of equal values it is that value, which their sum over their
+/// number need not be. Two renderers without noise would differ by the rounding, and surely so.
+pub(crate) fn mean(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    let origin = values.clone().next().filter(|v| v.is_finite()).unwrap_or(0.0);
+    let (n, sum) = values.fold((0.0, 0.0), |(n, sum), v| (n + 1.0, sum + (v - origin)));
+    origin + sum / n
+}
+
+/// Mean and unbiased variance of two values or more; the variance of fewer is NaN, of equal values 0.
 pub fn mean_variance(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
+    let mean = mean(values.iter().copied());
     let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
     (mean, if n < 2.0 { f64::NAN } else { squares / (n - 1.0) })
 }
@@ -219,6 +227,24 @@ mod reference {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Replicates of a renderer without noise: no error, no difference between so many and others.
+    #[test]
+    fn equal_values_are_exact() {
+        let mut random = SplitMix64(3);
+        for _ in 0..2000 {
+            let value = random.uniform();
+            for n in 2..20 {
+                let values = vec![value; n];
+                assert_eq!(mean_variance(&values), (value, 0.0));
+                let group: Group = values.iter().map(|v| vec![*v, 2.0 * v]).collect();
+                let e = jackknife(&[group], |m| m[0][0] / m[0][1]);
+                assert_eq!((e.value, e.se), (0.5, 0.0));
+            }
+            assert_eq!(welch(&vec![value; 16], &vec![value; 8]).p_two, 1.0);
+        }
+        assert!(mean_variance(&[f64::INFINITY, 1.0]).0.is_infinite() && mean_variance(&[]).0.is_nan());
+    }
 
     /// Student's quantiles end in the normal's, at any degrees of freedom.
     #[test]

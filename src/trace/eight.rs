@@ -23,7 +23,7 @@ pub struct Hits {
     pub leaves: [u32; 8],
     /// The same, as they were numbered when the tracer was built.
     pub triangles: [u32; 8],
-    /// The points, interpolated from the corners.
+    /// The points, as those of [`Hit`].
     pub points: Packet,
     /// Unit geometric normals, turned against the rays.
     pub normals: Packet,
@@ -88,6 +88,12 @@ pub(super) fn closest<L: Lanes>(tracer: &Tracer, rays: &Segments, mask: u32) -> 
     while flat != 0 {
         hits.normals.set(flat.trailing_zeros() as usize, Vec3::ZERO);
         flat &= flat - 1;
+    }
+    if !tracer.lifts.is_empty() {
+        for lane in (0..8).filter(|lane| hits.met >> lane & 1 == 1) {
+            let point = tracer.lifted(hits.leaves[lane] as usize, hits.points.get(lane), hits.normals.get(lane));
+            hits.points.set(lane, point);
+        }
     }
     hits
 }

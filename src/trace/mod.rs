@@ -38,7 +38,7 @@ pub use fan::Fan;
 pub use free::{Queue, Segments};
 pub use nearest::Nearest;
 pub use scalar::Scalar;
-pub use triangle::Ray;
+pub use triangle::{Ray, lift};
 pub use walk::Packet;
 pub use wide::{STACK as WIDE_STACK, Wide, WideNode};
 
@@ -57,7 +57,7 @@ pub struct Hit {
     pub triangle: u32,
     /// The same, as numbered in [`Tracer::triangles`].
     pub leaf: u32,
-    /// The point, interpolated from the corners.
+    /// The point, interpolated from the corners; off a needle by its [`lift`], on the side of the normal.
     pub point: Vec3,
     /// Unit geometric normal, turned against the ray.
     pub normal: Vec3,
@@ -72,6 +72,8 @@ pub struct Tracer {
     /// The leaf of the binary tree that holds each triangle.
     leaves: Vec<u32>,
     offset: f32,
+    /// [`lift`] of each triangle; none where it is 0 for all.
+    lifts: Vec<f32>,
     /// The largest coordinate, metres.
     magnitude: f32,
     tree: Tree8,
@@ -119,7 +121,8 @@ impl Tracer {
         }
         let tree = Tree8::new(&nodes, &triangles, pad);
         let offset = magnitude * 2.0f32.powi(-19);
-        Tracer { nodes, triangles, source, leaves, offset, magnitude, tree, fast: lanes::has_avx2() }
+        let lifts = lifts(&triangles, offset);
+        Tracer { nodes, triangles, source, leaves, offset, lifts, magnitude, tree, fast: lanes::has_avx2() }
     }
 
     /// Walks without AVX2, as on machines that have none: to test that, and to time it.
@@ -164,6 +167,7 @@ impl Tracer {
     /// Takes another scene's offset, so that both start rays at the same points.
     pub fn set_offset(&mut self, offset: f32) {
         self.offset = offset;
+        self.lifts = lifts(&self.triangles, offset);
     }
 
     /// The scalar walk.
@@ -237,18 +241,29 @@ impl Tracer {
         by_lanes!(self.fast, faces, one::first[], (tracer: &Tracer, ray: &Ray) -> Option<one::Met>)
     }
 
+    /// A point of a triangle, off it by what its shape asks for.
+    #[inline(always)]
+    fn lifted(&self, leaf: usize, point: Vec3, normal: Vec3) -> Vec3 {
+        match self.lifts.get(leaf) {
+            Some(&lift) if lift > 0.0 => point + normal * lift,
+            _ => point,
+        }
+    }
+
     /// What is known of a hit on a triangle, by its barycentric weights.
     fn hit(&self, ray: &Ray, t: f32, leaf: usize, weights: Vec3) -> Hit {
         let [a, b, c] = self.triangles[leaf];
         let normal = (b - a).cross(c - a).normalize_or_zero();
-        Hit {
-            t,
-            triangle: self.source[leaf],
-            leaf: leaf as u32,
-            point: a * weights.x + b * weights.y + c * weights.z,
-            normal: if normal.dot(ray.direction) > 0.0 { -normal } else { normal },
-        }
+        let normal = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
+        let point = self.lifted(leaf, a * weights.x + b * weights.y + c * weights.z, normal);
+        Hit { t, triangle: self.source[leaf], leaf: leaf as u32, point, normal }
     }
+}
+
+/// None where no triangle is lifted.
+fn lifts(triangles: &[[Vec3; 3]], offset: f32) -> Vec<f32> {
+    let lifts: Vec<f32> = triangles.iter().map(|t| lift(*t, offset)).collect();
+    if lifts.iter().any(|l| *l > 0.0) { lifts } else { Vec::new() }
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ mod gpu;
 mod gpu_query;
 mod gpu_raster;
 mod library;
+mod needles;
 mod occluders;
 mod oracles;
 mod screen_space;

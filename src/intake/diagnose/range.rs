@@ -48,7 +48,8 @@ pub(super) fn find(image: &[f32], reference: &[f32], width: usize) -> Option<(Fi
     let unsigned: Vec<f32> = image.iter().map(|v| (v + 1.0) / 2.0).collect();
     let far = |image: &[f32]| left(image, reference, width)[0].max(0.0);
     let is_signed = least >= -1.0 + BELOW && SIGNED * far(&unsigned) < far(image);
-    let finding = Finding::Negative { count: below, least, is_signed, is_doubt: share < MANY && !is_signed };
+    let finding =
+        Finding::Negative { count: below, least, is_signed, is_doubt: share < MANY && !is_signed && least >= BOTTOM };
     Some((finding, if is_signed { unsigned } else { image.to_vec() }))
 }
 

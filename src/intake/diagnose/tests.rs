@@ -304,6 +304,13 @@ fn other_scales_and_values_below_zero_are_told() {
     let light: Vec<f32> = SELF.classic(64).iter().enumerate().map(|(i, v)| v * (1 + i % 7) as f32).collect();
     let found = SELF.diagnose(&light);
     assert!(matches!(found[0], Finding::Range { scale: None, .. }), "{found:?}");
+    // So far out of range, few or many: no filter leaves them.
+    for every in [6000, 200, 33, 12] {
+        let far: Vec<f32> =
+            SELF.classic(64).iter().enumerate().map(|(i, v)| if i % every == 7 { -2.0 } else { *v }).collect();
+        let found = SELF.diagnose(&far);
+        assert!(found.iter().any(|f| !f.is_doubt()), "every {every}th: {found:?}");
+    }
     let text = Finding::Negative { count: 9, least: -0.2, is_signed: false, is_doubt: true }.to_string();
     assert!(text.starts_with("negative openness: 9 pixels are below 0, the least is -0.200;"), "{text}");
 }

@@ -3,7 +3,7 @@
 use crate::{
     counted::counted,
     gate::{Outcome, Verdict},
-    record::Record,
+    record::{End, Record},
     report::{errors, in_a_line, table::margin},
     untrusted::{cut, line},
 };
@@ -103,7 +103,14 @@ fn all(record: &Record) -> Vec<Annotation> {
         let (level, word) = if g.excused { (Level::Notice, "Not run") } else { (Level::Warning, "Inconclusive") };
         Annotation::new(level, format!("{word}: {}", g.gate), format!("Nothing was held against it: {}", g.reason))
     });
-    early.chain(failed).chain(of_gates).chain(idle).collect()
+    let nothing = (record.end() == End::Nothing && record.idle_gates.is_empty()).then(|| {
+        Annotation::new(
+            Level::Warning,
+            "Inconclusive: nothing judged",
+            "No gate speaks of the images that were handed in.",
+        )
+    });
+    early.chain(nothing).chain(failed).chain(of_gates).chain(idle).collect()
 }
 
 /// The gates that came to this, with their verdicts of this outcome.

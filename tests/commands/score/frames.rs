@@ -29,6 +29,21 @@ fn whole_frames_give_what_they_can() {
         let value = |c: &CaseRecord| c.metric(name, region).unwrap().value.unwrap();
         assert!((value(own) - value(theirs)).abs() < 1e-5, "{name:?}");
     }
+    // A curve of the openness in such frames is undone as in any other image.
+    let curved = Images::new();
+    for (r, image) in replicates.iter().enumerate() {
+        let squared: Vec<f32> = image.iter().map(|v| 0.5 * v * v).collect();
+        curved.exr(&format!("curtain-arcade.classic.4.{r:04}.with.exr"), &squared, size);
+        curved.exr(&format!("curtain-arcade.classic.4.{r:04}.without.exr"), &vec![0.5; image.len()], size);
+    }
+    let (code, text) = curved.score(&["--partial", "--curve", "1,2"]);
+    assert_eq!(code, 0, "{text}");
+    let apart = profile(&curved.record())
+        .iter()
+        .zip(&profile(&run))
+        .map(|(a, b)| (a.unwrap() - b.unwrap()).abs())
+        .fold(0.0, f64::max);
+    assert!(apart < 1e-5, "{apart}");
     let lone = Images::new();
     for (r, image) in replicates.iter().enumerate() {
         lone.exr(&format!("curtain-arcade.classic.4.{r:04}.frame.exr"), image, size);
@@ -40,8 +55,12 @@ fn whole_frames_give_what_they_can() {
     let of = |metric: &str| format!("[[gate]]\nname = '{metric}'\nmetric = '{metric}'\nmin = -50.0\n");
     for (text, expected) in [(of("judge-contrast"), 4), (of("judge-contrast") + &of("contrast"), 0)] {
         fs::write(&gates, text).unwrap();
-        let (code, text) = lone.score(&["--partial", "--gates", gates.to_str().unwrap()]);
+        let reports = ["--report", "junit", "--report", "github"];
+        let (code, text) = lone.score(&[&["--partial", "--gates", gates.to_str().unwrap()], &reports[..]].concat());
         assert_eq!(code, expected, "{text}");
+        let junit = fs::read_to_string(lone.out().join("junit.xml")).unwrap();
+        assert_eq!(junit.contains("no gate speaks of the images"), expected == 4, "{junit}");
+        assert_eq!(text.contains("::warning title=Inconclusive%3A nothing judged"), expected == 4, "{text}");
     }
     fs::remove_file(&gates).unwrap();
     let record = lone.record();

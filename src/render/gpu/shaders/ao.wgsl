@@ -92,9 +92,12 @@ fn met(hit: Hit, direction: vec3<f32>) -> Surface {
     let a = corner(hit.triangle, 0u);
     let b = corner(hit.triangle, 1u);
     let c = corner(hit.triangle, 2u);
-    let normal = unit(cross(b - a, c - a));
+    let front = unit(cross(b - a, c - a));
+    let normal = select(front, -front, dot(front, direction) > 0.0);
     let point = a * hit.weights.x + b * hit.weights.y + c * hit.weights.z;
-    return Surface(point, hit.triangle, select(normal, -normal, dot(normal, direction) > 0.0), 0u);
+    // A triangle without area has no normal.
+    let up = lift(a, b, c, params.offset);
+    return Surface(select(point, point + normal * up, up > 0.0), hit.triangle, normal, 0u);
 }
 
 // The ray of an image point: column and row, in pixels from the top left corner.

@@ -109,6 +109,20 @@ fn meets(ray: Ray, triangle: u32, tmax: f32) -> Meeting {
     return Meeting(t > 0.0 && t <= tmax, t, seen.areas / det);
 }
 
+// How far a point on a triangle is moved off it beyond the offset of all ray
+// origins: what its shape makes of the rounding of the test above. Twin: lift.
+fn lift(a: vec3<f32>, b: vec3<f32>, c: vec3<f32>, offset: f32) -> f32 {
+    let ab = b - a;
+    let ac = c - a;
+    let bc = c - b;
+    let longest = max(max(dot(ab, ab), dot(ac, ac)), dot(bc, bc));
+    let area = length(cross(ab, ac));
+    if area <= 0.0 {
+        return 0.0;
+    }
+    return clamp(0x1p-24 * longest * sqrt(longest) / area - offset, 0.0, 256.0 * offset);
+}
+
 // Whether a triangle turns its front against a ray of this direction.
 fn faces(triangle: u32, direction: vec3<f32>) -> bool {
     let a = corner(triangle, 0u);
