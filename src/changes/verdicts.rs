@@ -194,7 +194,8 @@ pub(super) fn gates(base: &Record, new: &Record) -> Gates {
         let (base, new) = (limit(&old, gate)?, limit(&verdicts, gate)?);
         (base != new).then(|| LimitChange { gate: gate.clone(), base, new })
     });
-    let rendered: BTreeSet<String> = new.cases.iter().map(|c| c.case.id()).collect();
+    // A case that ended with an error has no verdict, whatever the suite demands of it.
+    let rendered: BTreeSet<String> = new.cases.iter().filter(|c| c.error.is_none()).map(|c| c.case.id()).collect();
     let is_there = |v: &Verdict| match &v.case {
         Some(case) => rendered.contains(&case.id()),
         None => v.is_on_judge() && new.scenes.iter().any(|s| s.name == v.scene),

@@ -277,10 +277,13 @@ fn frames(args: &Args, scene: &Scene, estimator: Estimator, rays: u32) -> Result
     let mut loaded = renderer.load(&geometry).map_err(fail)?;
     // The measure view's own depth buffer does not hold the occluder.
     let measured = args.view == Which::Measure && matches!(estimator, Estimator::ScreenSpace(_));
+    // Both of a pair are seen from one place: that of the whole scene.
+    let whole = if measured && twin.is_some() { Some(Geometry::new(scene).map_err(fail)?) } else { None };
     let camera = measured.then(|| {
-        let points = GBuffer::new(&geometry.tracer, &view);
-        let regions = Regions::new(scene, &geometry.tracer, &points);
-        screen_camera(scene, &geometry.tracer, &points, &regions)
+        let tracer = &whole.as_ref().unwrap_or(&geometry).tracer;
+        let points = GBuffer::new(tracer, &view);
+        let regions = Regions::new(scene, tracer, &points);
+        screen_camera(scene, tracer, &points, &regions)
     });
     let frame = |replicate| {
         let job = Job {

@@ -143,8 +143,8 @@ const CODE_ROUNDING: f64 = 1e-6;
 pub(super) fn within(tolerance: f64, range: Option<f64>) -> f64 {
     match range {
         Some(range) => tolerance + CODE_ROUNDING / range,
-        None if tolerance > 0.0 => tolerance + ROUNDING,
-        None => 0.0,
+        // Floats that are no codes may differ by far less: of a tolerance never more than a 64th is rounding.
+        None => tolerance + ROUNDING.min(tolerance / 64.0),
     }
 }
 

@@ -178,7 +178,15 @@ impl Files<'_> {
         keep: &mut Keep<'_>,
     ) -> Result<PairReport, CompareError> {
         let region = &settings.region;
-        let judged = |exact| PairReport::judged(self.name, None, exact, None, None, &settings.limits);
+        let further = [
+            ("the reference", read::further(self.reference, bytes.reference)?),
+            ("the test image", read::further(self.test, bytes.test)?),
+        ];
+        let further = further.iter().filter_map(|(of, what)| what.map(|what| format!("{what} of {of}")));
+        let further = further.collect::<Vec<_>>().join("; ");
+        let note = (!further.is_empty() && !bytes.same).then(|| format!("not compared: {further}"));
+        let judged =
+            |exact| PairReport::judged(self.name, None, exact, None, None, &settings.limits).with_note(note.clone());
         if let Some(path) = self.with_layer(settings) {
             return Err(DiskError::content(path, "only OpenEXR images have layers").into());
         }
@@ -289,7 +297,13 @@ impl Files<'_> {
             tolerance: settings.tolerance,
         };
         let pair = Pair::new(reference, test, weights.as_deref())?;
-        let (scores, maps) = scores(&pair, &settings.options)?;
+        let (mut scores, maps) = scores(&pair, &settings.options)?;
+        // Places are those of the whole image, as those of the exact metric.
+        for summary in scores.maps.values_mut() {
+            for at in [&mut summary.min_at, &mut summary.max_at] {
+                *at = [at[0] + corner[0], at[1] + corner[1]];
+            }
+        }
         let size = scores.size.map(|n| n as u32);
         let welch = sampled.map(|sampled| WelchReport::of(size, sampled));
         let p = sampled.map(|[reference, test]| move || pixel_p_values(size, &test.sample(), &reference.sample()));

@@ -220,15 +220,17 @@ fn welch_value(name: WelchName, welch: Option<&WelchReport>) -> Result<f64, Stri
     let scale = match name {
         WelchName::Bias if welch.bias.is_finite() => return Ok(welch.bias),
         WelchName::Bias => return Err("no pixel has a number in all replicates".to_owned()),
+        _ if welch.interval.is_none() => {
+            return Err("no replicate differs from another: there is nothing to test with".to_owned());
+        }
         WelchName::Rejected => None,
         WelchName::Pixels => Some(Scale::Pixel),
         WelchName::Tiles => Some(Scale::Tile),
         WelchName::Image => Some(Scale::Image),
     };
     let asked = welch.scales.iter().filter(|s| scale.is_none_or(|scale| s.scale == scale));
-    let (rejected, sees) = asked.fold((0, false), |(n, sees), s| {
-        (n + s.rejected.len(), sees || s.detectable > 0.0 && s.detectable.is_finite() || !s.rejected.is_empty())
-    });
+    let (rejected, sees) = asked
+        .fold((0, false), |(n, sees), s| (n + s.rejected.len(), sees || s.sees_something() || !s.rejected.is_empty()));
     if sees { Ok(rejected as f64) } else { Err("what bias the test would have found is not known".to_owned()) }
 }
 

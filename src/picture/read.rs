@@ -146,7 +146,8 @@ pub fn decode(
     let encoding = encoding.unwrap_or(if floats { Encoding::Linear } else { Encoding::Srgb });
     let (planes, alpha) = (samples.planes(), samples.alpha());
     let image = Image::new(samples.size, planes, encoding).map_err(|e| DiskError::content(path, e.to_string()))?;
-    let others = if alpha == Alpha::Varied { vec!["A".to_owned()] } else { Vec::new() };
+    let mut others = if alpha == Alpha::Varied { vec!["A".to_owned()] } else { Vec::new() };
+    others.extend(further(path, bytes)?.map(str::to_owned));
     Ok(vec![Found { image, layer: String::new(), origin: [0, 0], alpha, others }])
 }
 
@@ -202,6 +203,18 @@ pub fn claim(path: &Path, bytes: &[u8]) -> Result<Claim, DiskError> {
     let channels = usize::from(color.channel_count());
     let size = with_pixels(path, [width as usize, height as usize])?;
     Ok(of(size, channels, usize::from(color.bytes_per_pixel()) / channels.max(1)))
+}
+
+/// What a file that is no OpenEXR image holds beside the one image that is read.
+///
+/// # Errors
+/// As [`claim`].
+pub fn further(path: &Path, bytes: &[u8]) -> Result<Option<&'static str>, DiskError> {
+    Ok(match reader(path, bytes)?.format() {
+        Some(ImageFormat::Png) if read_png::frames(path, bytes)? > 1 => Some("further frames"),
+        Some(ImageFormat::Tiff) if tiff_lists::has_further_pages(bytes) => Some("further pages"),
+        _ => None,
+    })
 }
 
 /// Width and height of an image that is whole, from its first byte to its last: it is

@@ -38,7 +38,8 @@ pub(super) fn exr_size(path: &Path, bytes: &[u8]) -> Result<[usize; 2], DiskErro
 pub(super) fn names(path: &Path, bytes: &[u8]) -> Result<Vec<String>, DiskError> {
     let first = claim::exr(path, bytes)?.headers.into_iter().next();
     let channels = first.map(|h| h.channels.list).unwrap_or_default();
-    Ok(channels.iter().map(|c| c.name.to_string()).map(|n| n.strip_suffix(GREY).unwrap_or(&n).to_owned()).collect())
+    let names: Vec<String> = channels.iter().map(|c| c.name.to_string()).collect();
+    Ok(names.iter().map(|name| called("", name, &names)).collect())
 }
 
 /// Whether one layer stands for the image, by the headers alone.
@@ -47,8 +48,9 @@ pub(super) fn has_main(path: &Path, bytes: &[u8]) -> Result<bool, DiskError> {
     let mut channels = Channels { first: String::new(), all: BTreeMap::new() };
     for (i, header) in headers.iter().enumerate() {
         let prefix = prefix(headers.len(), i, header.own_attributes.layer_name.as_ref());
-        for channel in &header.channels.list {
-            let name = called(&prefix, &channel.name);
+        let names: Vec<String> = header.channels.list.iter().map(|c| c.name.to_string()).collect();
+        for name in &names {
+            let name = called(&prefix, name, &names);
             let numbers = Numbers::Float(Vec::new());
             channels.all.insert(name.clone(), Channel { name, size: [0, 0], origin: [0, 0], numbers });
         }
@@ -65,10 +67,12 @@ fn prefix(parts: usize, part: usize, name: Option<&Text>) -> String {
     if parts > 1 { format!("{name}.") } else { String::new() }
 }
 
-/// What a channel is called here.
-fn called(prefix: &str, name: &Text) -> String {
-    let name = name.to_string();
-    prefix.to_owned() + name.strip_suffix(GREY).unwrap_or(&name)
+/// What a channel of a part that has these is called here. Beside X or Z, Y is one of a vector, as of normals, and
+/// no grey layer.
+fn called(prefix: &str, name: &str, part: &[String]) -> String {
+    let is_grey =
+        |base: &&str| !part.iter().any(|n| n.strip_prefix(*base).is_some_and(|axis| axis == ".X" || axis == ".Z"));
+    prefix.to_owned() + name.strip_suffix(GREY).filter(is_grey).unwrap_or(name)
 }
 
 /// Reads the layers asked for.
@@ -144,8 +148,9 @@ impl Channels {
         for (i, part) in image.layer_data.into_iter().enumerate() {
             let prefix = prefix(parts, i, part.attributes.layer_name.as_ref());
             let at = part.attributes.layer_position;
+            let names: Vec<String> = part.channel_data.list.iter().map(|c| c.name.to_string()).collect();
             for channel in part.channel_data.list {
-                let name = called(&prefix, &channel.name);
+                let name = called(&prefix, &channel.name.to_string(), &names);
                 let numbers = match channel.sample_data {
                     FlatSamples::F16(v) => Numbers::Float(v.into_iter().map(exr::prelude::f16::to_f32).collect()),
                     FlatSamples::F32(v) => Numbers::Float(v),
@@ -203,7 +208,8 @@ impl Channels {
 
     fn named(&self, path: &Path, name: &str) -> Result<Vec<String>, DiskError> {
         let prefix = if name.is_empty() { String::new() } else { format!("{name}.") };
-        [three(&prefix), vec![name.to_owned()]]
+        let grey = name.strip_suffix(GREY).unwrap_or(name);
+        [three(&prefix), vec![name.to_owned()], vec![grey.to_owned()]]
             .into_iter()
             .find(|wanted| self.has(wanted))
             .ok_or_else(|| DiskError::content(path, format!("no layer '{name}'; there are: {}", self.names())))

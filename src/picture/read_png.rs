@@ -51,6 +51,12 @@ pub(super) fn shape(path: &Path, bytes: &[u8]) -> Result<([usize; 2], usize, usi
     Ok((size, color.samples(), if depth == BitDepth::Sixteen { 2 } else { 1 }))
 }
 
+/// Frames of an animation, 1 of a plain image.
+pub(super) fn frames(path: &Path, bytes: &[u8]) -> Result<u32, DiskError> {
+    let reader = decoder(path, bytes)?.read_info().map_err(|e| broken(path, &e))?;
+    Ok(reader.info().animation_control.map_or(1, |a| a.num_frames))
+}
+
 /// Width and height of a file that is whole: its rows are decoded one by one, and dropped.
 pub(super) fn check_whole(path: &Path, bytes: &[u8]) -> Result<[usize; 2], DiskError> {
     let mut reader = decoder(path, bytes)?.read_info().map_err(|e| broken(path, &e))?;

@@ -49,6 +49,18 @@ pub(super) fn beyond_the_end(bytes: &[u8]) -> Option<u16> {
     None
 }
 
+/// Whether another directory follows the first one.
+pub(super) fn has_further_pages(bytes: &[u8]) -> bool {
+    let numbers = Numbers { bytes, little: bytes.starts_with(b"II") };
+    let next = || {
+        let big = numbers.at(2, 2)? == 43;
+        let (first, count, word) = if big { (numbers.at(8, 8)?, 8, 8) } else { (numbers.at(4, 4)?, 2, 4) };
+        let entries = numbers.at(first, count)?.checked_mul(4 + 2 * word)?;
+        numbers.at(first.checked_add(count)?.checked_add(entries)?, word)
+    };
+    next().is_some_and(|next| next != 0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

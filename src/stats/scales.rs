@@ -148,6 +148,13 @@ pub struct ScaleTest {
     pub detectable: f64,
 }
 
+impl ScaleTest {
+    /// Whether a bias that openness can have would be found: one between 0 and 1.
+    pub fn sees_something(&self) -> bool {
+        self.detectable > 0.0 && self.detectable < 1.0
+    }
+}
+
 /// Welch's test of every pixel, every tile and the whole image, from small to large.
 /// Images of one resolution, width and height in pixels; pixels without a number in
 /// either are left out of every place.

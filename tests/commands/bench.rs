@@ -58,6 +58,11 @@ fn times_and_rays_add_up() {
 
 #[test]
 fn what_is_wrong_is_named() {
+    if std::thread::available_parallelism().is_ok_and(|cores| cores.get() < 256) {
+        let output = aogauge(&["bench", "cpu", "--threads", "1,256"]);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(2) && message.contains("--threads is 256"), "{message}");
+    }
     for (args, says) in [
         (["--resolution", "1920"], "WIDTHxHEIGHT"),
         (["--resolution", "8x8"], "16 to 8192"),

@@ -89,6 +89,8 @@ fn regions_are_a_product_and_a_crop_cuts() {
     assert_eq!(crop["scores"]["size"], serde_json::json!([20, 12]));
     assert_eq!((crop["exact"]["pixels"].as_u64(), crop["exact"]["share"].as_f64()), (Some(180), Some(1.0 / 3.0)));
     assert_eq!(crop["exact"]["first"], serde_json::json!([15, 5]));
+    // Of the whole image, both.
+    assert_eq!(crop["scores"]["maps"]["absolute"]["max_at"], serde_json::json!([15, 5]));
     let exact = found(&["--exact", "--crop", "10,5,20,12", "--ignore", "0,0,15,30"]);
     assert_eq!(exact["exact"]["share"], crop["exact"]["share"]);
     assert_eq!(exact["exact"]["first"], crop["exact"]["first"]);
@@ -115,6 +117,16 @@ fn the_exact_mode_counts_codes() {
     assert_eq!(found(&["a.png", "c.png"])["exact"]["identical_files"], true);
     let table = text(&compare(folder.path(), &["a.png", "c.png", "--exact"]).stdout);
     assert_eq!(table, "identical files: 40 x 30 pixels, none differs\n");
+    // A tolerance of floats is no rounding of codes.
+    for (name, value) in [("small", 1e-6), ("other", 1.2e-6)] {
+        Layers::new([40, 30])
+            .with("mean", vec![value; 1200])
+            .write(&folder.path().join(format!("{name}.exr")))
+            .unwrap();
+    }
+    let floats =
+        |tolerance: &str| found(&["small.exr", "other.exr", "--tolerance", tolerance])["exact"]["differing"].clone();
+    assert_eq!([floats("1e-8"), floats("1.9e-7"), floats("2.1e-7")], [1200, 1200, 0]);
     // Other bytes, the same pixels, 16 bits.
     image::open(folder.path().join("a.png")).unwrap().to_rgb16().save(folder.path().join("wide.png")).unwrap();
     let wide = found(&["a.png", "wide.png"]);
@@ -451,6 +463,21 @@ fn the_test_of_replicates_has_limits() {
     // Of 1200 pixels 256 by 0.05.
     let (code, bias) = held("brighter.exr", "welch.bias<=0.02");
     assert!(code == 0 && (bias["value"].as_f64().unwrap() - 0.05 * 256.0 / 1200.0).abs() < 0.003, "{bias}");
+    // Where no replicate differs from another there is nothing to test with, whatever a ray is worth.
+    let still = |name: &str, last: f32| {
+        let image = || [vec![0.5; 1199], vec![last]].concat();
+        let mut layers = Layers::new([40, 30]).with("mean", image());
+        layers.attributes.insert("rays".to_owned(), "4".to_owned());
+        (0..4)
+            .fold(layers, |l, r| l.with(&format!("replicate-{r:04}"), image()))
+            .write(&folder.path().join(name))
+            .unwrap();
+    };
+    (still("still.exr", 0.5), still("moved.exr", 0.7));
+    for limit in ["welch.rejected<=0", "welch.pixels<=0"] {
+        let out = compare(folder.path(), &["still.exr", "moved.exr", "--fail", limit]);
+        assert_eq!(out.status.code(), Some(6), "{limit}: {}", text(&out.stdout));
+    }
     let (code, none) = held("plain.exr", "welch.rejected<=0");
     assert_eq!((code, none["state"].as_str()), (6, Some("no-value")));
     assert!(none["note"].as_str().unwrap().contains("two replicates or more"));

@@ -315,3 +315,53 @@ fn grey_tiff_of_floats_is_read() {
     GrayImage::new(20, 12).save(at("grey.tiff")).unwrap();
     assert_eq!(pair(folder.path(), &["grey.tiff", "grey.tiff", "--exact"])["exact"]["differing"], 0);
 }
+
+/// Positions and normals have a Y, too.
+#[test]
+fn the_y_of_a_vector_is_no_grey_layer() {
+    let folder = tempfile::tempdir().unwrap();
+    let normals = |x: f64| {
+        ["Normal.X", "Normal.Y", "Normal.Z", "ao.Y"].map(|n| (n, if n == "Normal.X" { x } else { 0.5 }.into()))
+    };
+    exr(&folder.path().join("a.exr"), &[("", &normals(0.5))]);
+    exr(&folder.path().join("b.exr"), &[("", &normals(0.9))]);
+    let says = expect(folder.path(), 2, &["a.exr", "b.exr", "--layer", "Normal"]);
+    assert!(says.contains("no layer 'Normal'") && says.contains("Normal.X, Normal.Y, Normal.Z, ao"), "{says}");
+    let mae = |layer: &str| value(&pair(folder.path(), &["a.exr", "b.exr", "--layer", layer]), "mae");
+    assert!(mae("Normal.X") > 0.0 && mae("Normal.Y") == 0.0);
+    // By its name in the file, as well.
+    assert_eq!((mae("ao"), mae("ao.Y")), (0.0, 0.0));
+}
+
+/// What is not looked at is told: pages and frames behind the first.
+#[test]
+fn further_pages_and_frames_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let frames = |name: &str, second: u8| {
+        let mut encoder = png::Encoder::new(fs::File::create(at(name)).unwrap(), 4, 4);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_animated(2, 0).unwrap();
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_image_data(&[7; 16]).unwrap();
+        writer.write_image_data(&[second; 16]).unwrap();
+        writer.finish().unwrap();
+    };
+    (frames("a.png", 1), frames("b.png", 200));
+    DynamicImage::ImageRgb8(picture()).save(at("a.tif")).unwrap();
+    let mut tiff = fs::read(at("a.tif")).unwrap();
+    let first = u32::from_le_bytes(tiff[4..8].try_into().unwrap()) as usize;
+    let entries = u16::from_le_bytes(tiff[first..first + 2].try_into().unwrap()) as usize;
+    let next = first + 2 + 12 * entries;
+    tiff[next..next + 4].copy_from_slice(&(first as u32).to_le_bytes());
+    fs::write(at("b.tif"), &tiff).unwrap();
+    for (a, b, note) in [
+        ("a.png", "b.png", "further frames of the reference; further frames of the test image"),
+        ("a.tif", "b.tif", "further pages of the test image"),
+    ] {
+        let exact = pair(folder.path(), &[a, b, "--exact"]);
+        assert_eq!(exact["note"].as_str(), Some(&*format!("not compared: {note}")), "{exact}");
+        let measured = pair(folder.path(), &[a, b]);
+        assert!(measured["note"].as_str().unwrap().contains("further "), "{measured}");
+    }
+}

@@ -398,6 +398,15 @@ fn cases_limits_and_times_are_told() {
     let all = found(5, one, &lost, &[]);
     assert_eq!((&all["outcome"], &all["cases"]["lost"][0]["error"]), (&json!("lost"), &json!("the device was lost")));
     assert!(markdown(5, one, &lost).contains("#### 1 case or judge ended with an error\n"));
+    // It has no verdicts then, and the suite demands what it did.
+    let unjudged = edited("unjudged", |r| {
+        let case = &mut r["cases"][1];
+        (case["error"], case["image"], case["hash"], case["metrics"]) =
+            (json!("the device was lost"), Value::Null, Value::Null, json!([]));
+        let id = case["case"].clone();
+        items(r, "verdicts").retain(|v| v["case"] != id);
+    });
+    assert_eq!(found(5, one, &unjudged, &[])["gates"]["withdrawn"], json!([]));
     assert_eq!(found(0, &lost, one, &[])["cases"]["new"], json!(["scene/extended/cpu/4"]));
     assert_eq!(found(0, &lost, &lost, &[])["cases"]["still_failing"], json!(1));
 

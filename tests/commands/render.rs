@@ -57,6 +57,16 @@ fn every_estimator_renders_an_image() {
     assert!(render(dir.path(), &["--estimator", "local-indirect"]).get("color.R").is_some());
     let twin = image(&["--twin"]);
     assert!(twin > classic, "without the curtain more is open: {twin}");
+    // In screen space both of a pair are seen from one place: far from the pillar nothing changes.
+    let seen = |options: &[&str]| {
+        let shared = ["render", "pillar", "--out", "image.exr", "--estimator", "gtao", "--rays", "4"];
+        expect(0, dir.path(), &[&shared, options].concat());
+        Layers::read(&dir.path().join("image.exr")).unwrap().get("mean").unwrap().to_vec()
+    };
+    let (with, without) = (seen(&[]), seen(&["--twin"]));
+    let known = with.iter().zip(&without).filter(|(a, b)| a.is_finite() && b.is_finite());
+    let [all, equal] = known.fold([0, 0], |[all, equal], (a, b)| [all + 1, equal + usize::from(a == b)]);
+    assert!(5 * equal > all, "{equal} of {all} are equal");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::{
     sync::{Barrier, Mutex, PoisonError},
 };
 
-/// Points that are traced in one go.
+/// Points that are traced in one go, at most: where there are few, every thread has its share of them.
 const CHUNK: usize = 1024;
 
 /// Traces the rays of some points.
@@ -81,14 +81,15 @@ pub fn race(course: Course, sides: &[Side<'_>]) -> Vec<Raced> {
 fn one_thread(course: Course, sides: &[Side<'_>], thread: usize, barrier: &Barrier) -> Vec<Raced> {
     let Course { points, rays, rounds, threads } = course;
     let bytes = rays / 8;
-    let steps = points.div_ceil(CHUNK).div_ceil(threads);
+    let most = points.div_ceil(threads).clamp(1, CHUNK);
+    let steps = points.div_ceil(most).div_ceil(threads);
     let mut times = vec![vec![Vec::with_capacity(rounds); steps]; sides.len()];
     let mut raced = vec![Raced::default(); sides.len()];
-    let mut out = vec![0u8; CHUNK * bytes];
+    let mut out = vec![0u8; most * bytes];
     for round in 0..rounds {
         for step in 0..steps {
-            let start = ((step * threads + thread) * CHUNK).min(points);
-            let chunk = start..(start + CHUNK).min(points);
+            let start = ((step * threads + thread) * most).min(points);
+            let chunk = start..(start + most).min(points);
             for turn in 0..sides.len() {
                 let side = (turn + step + round) % sides.len();
                 let out = &mut out[..chunk.len() * bytes];

@@ -55,6 +55,13 @@ fn radius(text: &str) -> Result<f32, String> {
 
 pub fn execute(args: &Args) -> Result<Exit, Failure> {
     check_out(args.out.as_deref(), tables::TITLE, "processor")?;
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    if let Some(threads) = args.threads.iter().find(|n| **n > cores as u64) {
+        // Rates are by CPU time: threads that wait for a core would count as if they had one.
+        return Err(Failure::usage(format!(
+            "--threads is {threads}, and this machine runs {cores} at once: write 1 to {cores}"
+        )));
+    }
     let scenes = args.scenes.iter().map(|name| load(name)).collect::<Result<Vec<_>, _>>()?;
     let settings = Settings {
         size: args.size,

@@ -148,7 +148,7 @@ fn welch(found: Option<&WelchReport>) -> String {
             format!("; surest at {x}, {y} ({w} x {h}): bias {:+.5}, p = {:.1e}", d.bias, d.p)
         });
         // Where no replicate differs, or hardly any is there, nothing can be said.
-        let sees = if scale.detectable > 0.0 && scale.detectable < 1.0 {
+        let sees = if scale.sees_something() {
             format!("a bias of {:.4} would have been found", scale.detectable)
         } else {
             "what bias would have been found is not known".to_owned()

@@ -49,6 +49,8 @@ impl Default for Setup {
 
 /// Dispatches that are submitted before the device is waited for.
 const IN_FLIGHT: u32 = 64;
+/// The same by ray query on a software driver: Mesa 25's takes 5 s a dispatch.
+const IN_FLIGHT_SLOW: u32 = 4;
 
 /// An opened adapter.
 pub(super) struct Device {
@@ -282,7 +284,8 @@ impl Device {
         self.queue.submit([encoder.finish()]);
         // Patience is for a dispatch that hangs, not for a job of many. What goes wrong
         // is noted, and told by the next `check`.
-        if self.submitted.fetch_add(1, Ordering::Relaxed) % IN_FLIGHT == IN_FLIGHT - 1 {
+        let in_flight = if self.ray_query && self.is_software() { IN_FLIGHT_SLOW } else { IN_FLIGHT };
+        if self.submitted.fetch_add(1, Ordering::Relaxed) % in_flight == in_flight - 1 {
             match self.poll() {
                 Err(wgpu::PollError::Timeout) => drop(self.abandon()),
                 Err(e) => self.trouble.note(e.to_string()),

@@ -133,7 +133,11 @@ fn see(@builtin(global_invocation_id) id: vec3<u32>) {
 fn mu(d: f32) -> f32 {
     let n = params.falloff_numbers;
     switch FALLOFF {
-        case EXPONENTIAL: { return 1.0 - exp(-n.x * d); }
+        case EXPONENTIAL: {
+            // 1 - exp(-x) cancels where x is small; the series is right to the last bits there.
+            let x = n.x * d;
+            return select(1.0 - exp(-x), x * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x / 24.0))), x < 0.03);
+        }
         case QUADRATIC: { return (d / params.radius) * (d / params.radius); }
         case LINEAR_TAIL: { return clamp(1.0 - (1.0 - d / params.radius) / n.x, 0.0, 1.0); }
         case GAUSSIAN: {
