@@ -353,7 +353,10 @@ fn further_pages_and_frames_are_told() {
     let first = u32::from_le_bytes(tiff[4..8].try_into().unwrap()) as usize;
     let entries = u16::from_le_bytes(tiff[first..first + 2].try_into().unwrap()) as usize;
     let next = first + 2 + 12 * entries;
-    tiff[next..next + 4].copy_from_slice(&(first as u32).to_le_bytes());
+    let page = tiff[first..next + 4].to_vec();
+    let second = tiff.len() as u32;
+    tiff[next..next + 4].copy_from_slice(&second.to_le_bytes());
+    tiff.extend(page);
     fs::write(at("b.tif"), &tiff).unwrap();
     for (a, b, note) in [
         ("a.png", "b.png", "further frames of the reference; further frames of the test image"),
