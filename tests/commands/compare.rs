@@ -336,7 +336,12 @@ fn nan_is_counted_and_told() {
     };
     write("a.exr", vec![0.5, f32::NAN, 0.5, f32::NAN]);
     write("b.exr", vec![0.5, f32::NAN, f32::INFINITY, 0.25]);
-    let out = compare(folder.path(), &["a.exr", "b.exr", "--format", "json"]);
+    let out = compare(folder.path(), &["a.exr", "b.exr", "--format", "json", "--maps", "maps"]);
+    let maps = Layers::read(&folder.path().join("maps/maps.exr")).unwrap();
+    for map in ["absolute", "signed", "flip"] {
+        let is_known: Vec<bool> = maps.get(map).unwrap().iter().map(|v| v.is_finite()).collect();
+        assert_eq!(is_known, [true, false, false, false], "{map}");
+    }
     // A number against none is a fault, with and without limits.
     assert_eq!(out.status.code(), Some(1));
     let scores: Value = serde_json::from_slice(&out.stdout).unwrap();

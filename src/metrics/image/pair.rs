@@ -43,6 +43,8 @@ pub struct Pair<'a> {
     test: Cow<'a, Image>,
     weights: Option<Vec<f32>>,
     non_finite: NonFinite,
+    /// The pixels of these.
+    holes: Vec<usize>,
 }
 
 impl<'a> Pair<'a> {
@@ -63,6 +65,7 @@ impl<'a> Pair<'a> {
             test: Cow::Borrowed(test),
             weights: mask.map(<[f32]>::to_vec),
             non_finite: NonFinite::default(),
+            holes: Vec::new(),
         };
         if !(whole(reference) && whole(test)) {
             let weights = pair.weights.get_or_insert_with(|| vec![1.0; reference.pixels()]);
@@ -75,6 +78,7 @@ impl<'a> Pair<'a> {
                 };
                 *count += usize::from(*weight > 0.0);
                 *weight = 0.0;
+                pair.holes.push(i);
                 for image in [&mut pair.reference, &mut pair.test] {
                     image.to_mut().planes.iter_mut().for_each(|p| p[i] = 0.0);
                 }
@@ -105,6 +109,11 @@ impl<'a> Pair<'a> {
     /// Pixels without a number.
     pub fn non_finite(&self) -> NonFinite {
         self.non_finite
+    }
+
+    /// Pixels that hold no number in one image or in both; they are 0 in what is compared.
+    pub(super) fn holes(&self) -> &[usize] {
+        &self.holes
     }
 
     pub(super) fn weight(&self, pixel: usize) -> f64 {

@@ -124,7 +124,7 @@ impl Default for Options {
 /// Maps of the error, a value a pixel, row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Maps {
-    /// |test - reference|, mean over channels.
+    /// |test - reference|, mean over channels; as in all maps NaN where an image holds no number.
     pub absolute: Vec<f32>,
     /// test - reference, mean over channels.
     pub signed: Vec<f32>,
@@ -206,6 +206,12 @@ pub fn scores(pair: &Pair<'_>, options: &Options) -> Result<(Scores, Maps), Imag
     }
     if options.ssimulacra2 {
         all.push(score(ScoreName::Ssimulacra2, super::ssimulacra2::ssimulacra2(pair)));
+    }
+    // Where there is no number there is no error either, and not one of 0.
+    for map in [&mut maps.absolute, &mut maps.signed, &mut maps.ssim, &mut maps.flip, &mut maps.hdr_flip] {
+        if !map.is_empty() {
+            pair.holes().iter().for_each(|&pixel| map[pixel] = f32::NAN);
+        }
     }
     let weight = pair.weights().map_or(image.pixels() as f64, |w| w.iter().copied().map(f64::from).sum());
     let scores = Scores {
