@@ -106,6 +106,10 @@ impl<'a> Parts<'a> {
                 "scene '{scene}' is not what it was in the base record: its hash is {new}, there {old}; make a new base"
             ));
         }
+        // What the camera shows is no matter of the judge's contrast.
+        if own.regions != old.regions || case.is_some() && own.screen != old.screen {
+            return none(format!("the regions of scene '{scene}' hold other pixels than in the base record"));
+        }
         let Some(case) = case else {
             let metric = old.judge.as_ref().map(|j| j.contrast.clone());
             return Found {
@@ -114,9 +118,6 @@ impl<'a> Parts<'a> {
                 looks: None,
             };
         };
-        if own.regions != old.regions || own.screen != old.screen {
-            return none(format!("the regions of scene '{scene}' hold other pixels than in the base record"));
-        }
         let method = |suite: &'a SuiteInfo| suite.methods.get(&case.estimator);
         match (method(self.suite), base.suite.methods.get(&case.estimator)) {
             (_, None) => return none(format!("the base record has no estimator '{}'", case.estimator)),
@@ -139,4 +140,52 @@ fn metric_of(found: &CaseRecord, gate: &Gate, name: &str) -> Result<Metric, Stri
     }
     let label = gate.metric.label();
     found.metric(gate.metric, gate.region).cloned().ok_or_else(|| format!("the case of {name} has no {label}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        gate::{
+            BASE, Evidence, Limit, Outcome, judge,
+            tests::{gate, record, scene, suite},
+        },
+        metrics::{MetricName, regions::Region},
+        record::{JudgeRecord, ScreenRecord, Stopped},
+    };
+    use std::collections::BTreeMap;
+
+    /// What the camera shows is no matter of the judge's.
+    #[test]
+    fn the_judge_of_other_pixels_is_another() {
+        let estimate = Estimate { value: 0.1, se: 0.01, df: 15.0 };
+        let judged = JudgeRecord {
+            contrast: Metric::new(MetricName::JudgeContrast, None, Ok(estimate)),
+            q: BTreeMap::new(),
+            paths: 1,
+            replicates: 16,
+            stopped: Stopped::Precise,
+            precision: None,
+            wanted: 1.0,
+            image: String::new(),
+        };
+        let own = SceneRecord { judge: Some(judged), ..scene("s") };
+        let at_base = Gate {
+            metric: MetricName::JudgeContrast,
+            against: Some(BASE.into()),
+            ..gate(Limit::Equals { target: 0.0, within: 0.1 })
+        };
+        let now = record(suite(vec![at_base]), vec![own.clone()], vec![]);
+        let held = |old: &SceneRecord| {
+            let base = record(suite(vec![]), vec![old.clone()], vec![]);
+            judge(&Evidence { base: Some(&base), ..Evidence::from(&now) }).0.remove(0)
+        };
+        let mut old = own.clone();
+        assert_eq!((held(&old).outcome, held(&old).value()), (Outcome::Pass, Some(0.0)));
+        old.screen = Some(ScreenRecord { eye: [0.0; 3], resolution: [8, 8], regions: BTreeMap::new() });
+        assert_eq!(held(&old).outcome, Outcome::Pass);
+        old.regions.insert(Region::Left, 9);
+        let v = held(&old);
+        assert!(v.outcome == Outcome::Inconclusive && v.reason.contains("hold other pixels"), "{}", v.reason);
+    }
 }

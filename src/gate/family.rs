@@ -60,8 +60,9 @@ impl<'a> From<&'a Record> for Evidence<'a> {
 /// (the reverse), and what would warn. So for each level alpha the chance that any
 /// gate of that alpha or a smaller one is wrongly red is at most alpha, in the whole
 /// run; and so for green. A p-value from look k of several is first divided by
-/// [`spending`](crate::stats::spending)(k); a difference from a base record with looks
-/// of its own by both, since either may have been looked at with any look of the other.
+/// [`spending`](crate::stats::spending)(k); a difference from a case at another look, or from a
+/// base record with looks of its own, by both, since either may have been looked at with any
+/// look of the other.
 pub fn judge(evidence: &Evidence<'_>) -> (Vec<Verdict>, Vec<IdleGate>) {
     let Evidence { suite, gpu, filter, scenes, cases, base, no_base, handed_in } = *evidence;
     let run =

@@ -1,7 +1,7 @@
 //! What more replicates of a case can decide, and what they cannot: a part of the standard
 //! error may be that of the judge, of the converged image or of a base record, and stays.
 
-use super::{BASE, Verdict};
+use super::{BASE, Limit, Verdict};
 use crate::{
     metrics::{Floor, Metric, MetricName},
     stats::{Estimate, decided},
@@ -60,39 +60,75 @@ pub(super) fn of_held(metric: &Metric, other: Option<(&str, &Metric)>) -> Option
     }
 }
 
-impl Verdict {
-    /// What is held against the limit, with its error.
-    fn held(&self) -> Option<Estimate> {
-        self.against.as_ref().map_or_else(|| self.metric.estimate(), |o| o.difference.estimate())
+/// A value with its error, and the part of that which replicates do not make smaller.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Standing {
+    held: Estimate,
+    floor: Option<Floor>,
+}
+
+impl Standing {
+    /// That of a metric alone; None where it has no value.
+    pub(crate) fn of(metric: &Metric) -> Option<Self> {
+        Some(Standing { held: metric.estimate()?, floor: floor(metric) })
+    }
+
+    /// The p-values, `[holds, broken]`, of a limit on it.
+    pub(crate) fn p(&self, limit: Limit) -> [f64; 2] {
+        [limit.p_holds(&self.held), limit.p_broken(&self.held)]
     }
 
     /// The variance that is of the case's own replicates.
-    fn own_variance(&self, held: &Estimate) -> f64 {
-        (held.se.powi(2) - self.floor.map_or(0.0, |f| f.se.powi(2))).max(0.0)
+    fn own_variance(&self) -> f64 {
+        (self.held.se.powi(2) - self.floor.map_or(0.0, |f| f.se.powi(2))).max(0.0)
     }
 
-    /// What would be held against the limit after so many times the replicates, if the value
-    /// stayed where it is; `times` may be infinite.
+    /// What there would be after so many times the replicates, if the value stayed where it is;
+    /// `times` may be infinite.
     ///
     /// The own part of the variance falls by that factor, and its degrees of freedom rise
     /// by it. They are what Welch and Satterthwaite's formula leaves for it.
-    fn after(&self, times: f64) -> Option<Estimate> {
-        let held = self.held()?;
-        let own = self.own_variance(&held);
-        let (fixed, of_fixed) = self.floor.map_or((0.0, 0.0), |f| (f.se.powi(2), f.se.powi(4) / f.df));
+    fn after(&self, times: f64) -> Estimate {
+        let Standing { held, floor } = *self;
+        let own = self.own_variance();
+        let (fixed, of_fixed) = floor.map_or((0.0, 0.0), |f| (f.se.powi(2), f.se.powi(4) / f.df));
         let left = held.se.powi(4) / held.df - of_fixed;
         let of_own = if left > 0.0 { left } else { own * own / held.df };
         let variance = own / times + fixed;
         let welch = of_own / times.powi(3) + of_fixed;
         let df = if welch > 0.0 { variance * variance / welch } else { held.df };
-        Some(Estimate { value: held.value, se: variance.sqrt(), df })
+        Estimate { value: held.value, se: variance.sqrt(), df }
+    }
+
+    /// Whether more replicates may still decide a limit: by what some number of them leaves of
+    /// the standard error, with the value anywhere within 2 of its own standard errors.
+    /// `decides` says it of two p-values, `[holds, broken]`.
+    pub(crate) fn can_be_decided(&self, limit: Limit, decides: impl Fn([f64; 2]) -> bool) -> bool {
+        let reach = REACH * self.own_variance().sqrt();
+        let [low, high] = [self.held.value - reach, self.held.value + reach];
+        let best = match limit {
+            Limit::Equals { target, .. } => target.clamp(low, high),
+            _ => self.held.value,
+        };
+        prospects().map(|times| self.after(times)).any(|after| {
+            let at = |value| Standing { held: Estimate { value, ..after }, floor: None };
+            [low, best, high].into_iter().any(|value| decides(at(value).p(limit)))
+        })
+    }
+}
+
+impl Verdict {
+    /// What is held against the limit, with its error.
+    fn standing(&self) -> Option<Standing> {
+        let held = self.against.as_ref().map_or_else(|| self.metric.estimate(), |o| o.difference.estimate());
+        Some(Standing { held: held?, floor: self.floor })
     }
 
     /// What is decided in 8 of 10 runs of so many times the replicates, over how far the value
     /// lies from the limit: 1 or less where it would be; None where that is not known.
     fn out_of_sight(&self, times: f64, family: usize) -> Option<f64> {
         let level = (1.0 - self.confidence) * self.spent / family.max(1) as f64;
-        let (margin, after) = (self.margin?.abs(), self.after(times)?);
+        let (margin, after) = (self.margin?.abs(), self.standing()?.after(times));
         match after.se {
             _ if margin == 0.0 => Some(f64::INFINITY),
             0.0 => Some(0.0),
@@ -132,29 +168,15 @@ impl Verdict {
         least.is_some_and(|ratio| ratio > 1.0 && (is_most || ratio * ratio < MOST))
     }
 
-    /// Whether more replicates of the case may still decide: by what some number of them leaves
-    /// of the standard error, with the value anywhere within 2 of its own standard errors.
-    /// `family` is how many verdicts the run has at most.
+    /// Whether more replicates of the case may still decide a limit, that which fails or that which
+    /// warns: by what some number of them leaves of the standard error, with the value
+    /// anywhere within 2 of its own standard errors. `family` is how many verdicts the run has at most.
     ///
     /// To end there errs no more often than to go on: what is not decided stays so.
-    pub fn can_be_decided(&self, family: usize) -> bool {
-        let Some(held) = self.held() else { return false };
-        if self.p_holds.is_none() || self.p_broken.is_none() {
-            return false;
-        }
-        let reach = REACH * self.own_variance(&held).sqrt();
-        let [low, high] = [held.value - reach, held.value + reach];
-        let best = match self.limit {
-            super::Limit::Equals { target, .. } => target.clamp(low, high),
-            _ => held.value,
-        };
-        prospects().filter_map(|times| self.after(times)).any(|after| {
-            [low, best, high].into_iter().any(|value| {
-                let there = Estimate { value, ..after };
-                let p = [self.limit.p_holds(&there), self.limit.p_broken(&there)];
-                decided(p, family, self.spent, 1.0 - self.confidence)
-            })
-        })
+    pub fn can_be_decided(&self, limit: Limit, family: usize) -> bool {
+        let decides = |p| decided(p, family, self.spent, 1.0 - self.confidence);
+        let has_tests = self.p_holds.is_some() && self.p_broken.is_some();
+        self.standing().is_some_and(|it| has_tests && it.can_be_decided(limit, decides))
     }
 
     /// What the floor is made of, the largest part first.
@@ -181,7 +203,7 @@ impl Verdict {
 mod tests {
     use super::*;
     use crate::gate::{
-        Gate, Limit, Outcome,
+        Gate, Outcome,
         tests::{case, gate, judged, measured, record, scene, suite},
         words,
     };
@@ -203,7 +225,7 @@ mod tests {
     #[test]
     fn what_is_needed_is_what_would_be_detected() {
         let v = verdict(LIMIT, 0.51, 0.01, 0.0);
-        assert!(v.floor.is_none() && v.can_be_decided(1) && !v.is_kept_by_floor(1));
+        assert!(v.floor.is_none() && v.can_be_decided(LIMIT, 1) && !v.is_kept_by_floor(1));
         let n = v.replicates_needed(1).unwrap();
         let there = Estimate { value: 0.51, se: 0.01 / n.sqrt(), df: 15.0 * n };
         assert!((LIMIT.detectable(&there, 0.05).unwrap() - 0.01).abs() < 1e-9, "{n}");
@@ -228,7 +250,7 @@ mod tests {
     fn a_floor_that_keeps_it_open_is_told_with_what_helps() {
         let v = verdict(LIMIT, 0.51, 0.01, 0.0095);
         assert_eq!(v.outcome, Outcome::Inconclusive);
-        assert!(v.replicates_needed(1).is_none() && v.is_kept_by_floor(1) && !v.can_be_decided(1));
+        assert!(v.replicates_needed(1).is_none() && v.is_kept_by_floor(1) && !v.can_be_decided(LIMIT, 1));
         for says in [
             "more replicates of the case would not decide: the noise of the judge is too large",
             "Of the standard error 0.0095 is that of the judge: more replicates of the case leave it as it is.",
@@ -238,12 +260,23 @@ mod tests {
         }
         assert!(!text(&v).contains("times the replicates"), "{}", text(&v));
         // The value may be where it is by noise of its own.
-        assert!(verdict(LIMIT, 0.51, 0.05, 0.0095).can_be_decided(1));
+        assert!(verdict(LIMIT, 0.51, 0.05, 0.0095).can_be_decided(LIMIT, 1));
         // Both edges of an equivalence may be too near for the rest.
         let equals = Limit::Equals { target: 0.5, within: 0.01 };
-        assert!(!verdict(equals, 0.5, 0.011, 0.01).can_be_decided(1));
-        assert!(verdict(equals, 0.5, 0.011, 0.002).can_be_decided(1));
-        assert!(!verdict(equals, 0.5, 0.011, 0.002).can_be_decided(100_000));
+        assert!(!verdict(equals, 0.5, 0.011, 0.01).can_be_decided(equals, 1));
+        assert!(verdict(equals, 0.5, 0.011, 0.002).can_be_decided(equals, 1));
+        assert!(!verdict(equals, 0.5, 0.011, 0.002).can_be_decided(equals, 100_000));
+    }
+
+    /// The limit that fails is far away, and what warns is as near as the judge's noise.
+    #[test]
+    fn each_limit_is_asked_for_itself() {
+        let (far, near) = (Limit::AtLeast(0.1), Limit::AtLeast(0.5));
+        let mut it = measured(case("s", "e", "cpu", 4), 0.51, 0.01);
+        it.metrics[0] = it.metrics[0].clone().with_floor(Some(Estimate { value: 0.0, se: 0.0095, df: 7.0 }));
+        let v = judged(vec![Gate { warn: Some(near), ..gate(far) }], &[it], None).0.remove(0);
+        assert_eq!(v.outcome, Outcome::Pass);
+        assert!(v.can_be_decided(far, 1) && !v.can_be_decided(near, 1));
     }
 
     /// The floor's few degrees of freedom are not all that is left until its variance is: at 4
@@ -255,7 +288,7 @@ mod tests {
         it.metrics[0] = it.metrics[0].clone().with_floor(Some(part));
         let v = judged(vec![gate(LIMIT)], &[it], None).0.remove(0);
         let family = 242;
-        let p = |times: f64| LIMIT.p_holds(&v.after(times).unwrap()) * family as f64;
+        let p = |times: f64| LIMIT.p_holds(&v.standing().unwrap().after(times)) * family as f64;
         assert!(
             p(1.0) > 0.05 && p(4.0) < 1e-3 && p(f64::INFINITY) > 0.01,
             "{} {} {}",
@@ -265,7 +298,7 @@ mod tests {
         );
         let family = 1000;
         assert!(v.out_of_sight(f64::INFINITY, family).unwrap() > 1.0);
-        assert!(v.can_be_decided(family) && !v.is_kept_by_floor(family));
+        assert!(v.can_be_decided(LIMIT, family) && !v.is_kept_by_floor(family));
         let times = v.replicates_needed(family).unwrap();
         assert!((1.1..8.0).contains(&times), "{times}");
         assert!(v.out_of_sight(times, family).unwrap() <= 1.0 && v.out_of_sight(0.9 * times, family).unwrap() > 1.0);
@@ -283,7 +316,7 @@ mod tests {
         };
         let v = at(0.0001);
         assert_eq!((v.outcome, v.floor), (Outcome::Inconclusive, Some(Floor { se: 0.006, df: 15.0 })));
-        assert!(!v.can_be_decided(1) && v.replicates_needed(1).is_none());
+        assert!(!v.can_be_decided(v.limit, 1) && v.replicates_needed(1).is_none());
         assert!(text(&v).contains("the noise of the base record is too large"), "{}", text(&v));
         assert!(text(&v).contains("make a base record of more replicates"), "{}", text(&v));
         // Another case of the same run gets replicates, too.
@@ -291,6 +324,6 @@ mod tests {
         let both =
             [measured(case("s", "classic", "cpu", 4), 0.5, 0.006), measured(case("s", "e", "cpu", 4), 0.508, 0.0001)];
         let v = judged(vec![against], &both, None).0.remove(0);
-        assert!(v.floor.is_none() && v.can_be_decided(1) && v.replicates_needed(1).is_some());
+        assert!(v.floor.is_none() && v.can_be_decided(v.limit, 1) && v.replicates_needed(1).is_some());
     }
 }

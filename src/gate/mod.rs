@@ -16,6 +16,7 @@ mod verdict;
 pub mod words;
 
 pub use family::{Evidence, family_at_most, judge};
+pub(crate) use floor::Standing;
 pub use limit::Limit;
 pub use verdict::{Other, Outcome, PValue, Verdict};
 

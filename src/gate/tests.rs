@@ -276,7 +276,7 @@ fn later_looks_must_be_surer() {
     assert_eq!((third.outcome, third.spent), (Outcome::Inconclusive, spending(3)));
     let p = third.p_holds.unwrap();
     assert!((p.adjusted - p.raw / spending(3)).abs() < 1e-12 && p.raw < 0.05);
-    assert!(third.reason.contains("but not after so many looks"), "{}", third.reason);
+    assert!(third.reason.contains("but not with the share of the error rate"), "{}", third.reason);
     assert!(third.detectable > once.detectable);
 }
 
@@ -304,6 +304,9 @@ fn a_metric_is_held_against_another_estimator() {
     (cases[1].looks, cases[3].looks) = (Some(2), Some(3));
     let v = &judged(vec![against.clone()], &cases, None).0[0];
     assert!((v.spent - spending(2) * spending(3)).abs() < 1e-15);
+    // At the same look they were looked at together.
+    cases[1].looks = Some(3);
+    assert_eq!(judged(vec![against.clone()], &cases, None).0[0].spent, spending(3));
     // None of this passes in silence.
     let says = |cases: &[CaseRecord], what: &str| {
         let v = &judged(vec![against.clone()], cases, None).0[0];
@@ -486,7 +489,7 @@ fn verdicts_explain_themselves() {
     now[0].looks = Some(2);
     says(
         &judged(vec![against.clone()], &now, Some(&base)).0[0],
-        &["That of the base record is 0.500.", "it may spend 0.152"],
+        &["That of the base record is 0.500.", "this one may spend 0.152 of it"],
     );
     let none = record(suite(vec![]), vec![scene("s")], vec![]);
     says(&judged(vec![against], &now, Some(&none)).0[0], &["It cannot be held against the base record.", "Mend what"]);

@@ -38,7 +38,8 @@ fn undecided(verdict: &Verdict, family: usize) -> String {
         format!("the interval holds the limit{} ({numbers})", prospect(verdict, family))
     } else if p.raw / verdict.spent >= alpha {
         format!(
-            "the interval clears the limit, but not after so many looks at the case: that it {what} is not sure ({numbers})"
+            "the interval clears the limit alone, but not with the share of the error rate that this look at the case may \
+             spend: that it {what} is not sure ({numbers})"
         )
     } else {
         format!(
@@ -242,9 +243,7 @@ fn evidence(verdict: &Verdict, family: usize) -> Option<String> {
     );
     let looks = if verdict.spent < 1.0 {
         let share = number(verdict.spent);
-        format!(
-            " It is not the first look at the case: it may spend {share} of the error rate, and p counts so much more."
-        )
+        format!(" Looks at the case share the error rate: this one may spend {share} of it, and p counts so much more.")
     } else {
         String::new()
     };
@@ -326,6 +325,10 @@ fn next(verdict: &Verdict, family: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        gate::tests::{case, gate, judged, measured},
+        record::CaseRecord,
+    };
 
     #[test]
     fn numbers_have_two_digits_that_count() {
@@ -338,5 +341,26 @@ mod tests {
             assert_eq!(p_text(p), text);
         }
         assert_eq!((percent(0.05000000000000004), number_of_percent(0.999_999)), ("5 %".into(), "99.9999".into()));
+    }
+    /// The first look has a share, too, and may come to nothing by it.
+    #[test]
+    fn a_look_is_told_by_its_share_alone() {
+        let at = |value, look| {
+            let it = measured(case("s", "e", "cpu", 4), value, 0.01);
+            judged(vec![gate(Limit::AtLeast(0.5))], &[CaseRecord { looks: Some(look), ..it }], None).0.remove(0)
+        };
+        let (sure, near, third) = (at(0.53, 1), at(0.523, 1), at(0.53, 3));
+        assert!(sure.outcome == Outcome::Pass && near.p_holds.is_some_and(|p| p.raw < 0.05 && p.adjusted > 0.05));
+        for (v, share) in [(&sure, "0.61"), (&near, "0.61"), (&third, "0.068")] {
+            let text = explain(v, 1).join(" ");
+            let says =
+                format!("Looks at the case share the error rate: this one may spend {share} of it, and p counts");
+            assert!(text.contains(&says), "{text}");
+            assert!(!text.contains("not the first look") && !text.contains("so many looks"), "{text}");
+            let open =
+                "but not with the share of the error rate that this look at the case may spend: that it holds is";
+            assert_eq!(v.reason.contains(open), v.outcome == Outcome::Inconclusive, "{}", v.reason);
+        }
+        assert!(third.outcome == Outcome::Inconclusive && near.outcome == Outcome::Inconclusive);
     }
 }

@@ -21,7 +21,8 @@ pub struct UntilSure {
 pub struct Undecided {
     /// Their scene.
     pub scene: String,
-    /// Primary rays a pixel, of the classic case among them where a method has its own.
+    /// Primary rays a pixel, of the classic case among them where a method has its own; the fewest
+    /// where gates hold cases of several ray counts against each other.
     pub rays: u32,
     /// Replicates that each of them has.
     pub replicates: u32,

@@ -13,7 +13,7 @@ use super::{
     subject::Subject,
 };
 use crate::{
-    metrics::{Absent, artifact::Method as Measured, error::Pairing, judge::JudgedRegions, regions::Regions},
+    metrics::{Absent, Metric, artifact::Method as Measured, error::Pairing, judge::JudgedRegions, regions::Regions},
     record::{CaseRecord, OccluderMetrics, RecordFolder, SceneRecord, Undecided},
     suite::Case,
 };
@@ -108,7 +108,6 @@ impl Subject<'_> {
         judged: &Result<Judged, Unjudged>,
         counts: &Counts,
     ) -> Vec<CaseRecord> {
-        let classic = &self.plan.suite.methods[self.plan.suite.classic()].name;
         let images = |case: &Case| rendered.replicates(case, counts);
         let truth = |case: &Case| rendered.truths.get(&self.method(case));
         let mut records = Vec::new();
@@ -135,10 +134,7 @@ impl Subject<'_> {
                 }
             };
             let method = measured(replicates, converged, regions);
-            let on_classic = self.plan.suite.classic_beside(case);
-            let beside = truth(&on_classic).filter(|t| case.estimator != *classic && t.fault.is_none());
-            let classic_on =
-                |regions| beside.and_then(|truth| Some(measured(images(&on_classic)?, &truth.converged, regions)));
+            let classic_on = |regions| self.classic_beside(case, rendered, counts, regions);
             let on_cpu = Case { renderer: "cpu".into(), ..case.clone() };
             let cpu = images(&on_cpu).filter(|_| case.renderer != "cpu");
             // Whoever draws random numbers of their own shares none with the CPU.
@@ -165,6 +161,34 @@ impl Subject<'_> {
             });
         }
         records
+    }
+
+    /// The images of classic AO that a case is compared with, measured on some regions.
+    fn classic_beside<'b>(
+        &self,
+        case: &Case,
+        rendered: &'b Rendered,
+        counts: &Counts,
+        regions: &'b Regions,
+    ) -> Option<Measured<'b>> {
+        let suite = &self.plan.suite;
+        let classic = Some(suite.classic_beside(case)).filter(|_| !suite.is_classic(&case.estimator))?;
+        let truth = rendered.truths.get(&self.method(&classic)).filter(|t| t.fault.is_none())?;
+        Some(measured(rendered.replicates(&classic, counts)?, &truth.converged, regions))
+    }
+
+    /// dK of classic AO on the pixels of a case: what is removed has a value only where this is
+    /// clearly above 0.
+    pub(super) fn classic_error(
+        &self,
+        case: &Case,
+        rendered: &Rendered,
+        judged: &Result<Judged, Unjudged>,
+        counts: &Counts,
+    ) -> Option<Metric> {
+        let method = self.method(case);
+        let classic = self.classic_beside(case, rendered, counts, self.regions(method))?;
+        Some(classic.contrast_error(self.judge_of(method, judged)))
     }
 
     /// What is doubtful in images that somebody else's program left, or what is wrong with them; nothing in

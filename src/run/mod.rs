@@ -6,6 +6,7 @@
 //! these images afterwards, so a run that goes on where a killed one ended, or that is
 //! put together from shards, comes to the same record.
 
+mod blocks;
 mod case_metrics;
 mod error;
 mod external;

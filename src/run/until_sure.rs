@@ -1,6 +1,6 @@
 //! Replicates are added where a verdict is not decided yet.
 //!
-//! The cases of one scene and ray count make a block: they are compared with each other,
+//! The cases of one scene and ray count make a [block](Blocks): they are compared with each other,
 //! so they keep in step. A block begins with 4 replicates and doubles them until each of its
 //! verdicts is decided, and whether it warns, or a budget ends, or no number of them would
 //! help. Each look spends its share of the error
@@ -11,6 +11,7 @@
 
 use super::{
     RunError,
+    blocks::Blocks,
     judging::{Judged, Unjudged},
     measuring::Counts,
     rendering::{Rendered, Studio},
@@ -18,10 +19,11 @@ use super::{
     unit::Unit,
 };
 use crate::{
-    gate::{Evidence, Verdict, family_at_most, judge},
+    gate::{BASE, CONFIDENCE, Evidence, Limit, Standing, Verdict, family_at_most, judge},
+    metrics::{Metric, MetricName},
     record::{Budget, CaseRecord, SceneRecord, Undecided},
     stats::decided,
-    suite::{Case, Plan},
+    suite::Case,
 };
 use std::{collections::BTreeSet, time::Instant};
 
@@ -36,17 +38,13 @@ fn looks(most: u32) -> Vec<u32> {
     all
 }
 
-/// The block of a case: its rays, or those of the classic case it is compared with.
-fn block(plan: &Plan<'_>, case: &Case) -> u32 {
-    plan.suite.classic_beside(case).rays
-}
-
 /// What is found of a scene before a run is at its end, and may end it.
 struct Sight<'a> {
     scene: SceneRecord,
     judged: &'a Result<Judged, Unjudged>,
     /// Tests that all verdicts of the plan come to, at most.
     family: usize,
+    blocks: Blocks<'a>,
 }
 
 impl Studio<'_> {
@@ -72,6 +70,7 @@ impl Studio<'_> {
             scene: self.set.subject.scene_facts(rendered, &judged),
             judged: &judged,
             family: family_at_most(&plan.suite.gates, &scenes, &plan.cases),
+            blocks: Blocks::new(plan, self.set.subject.cases()),
         };
         let Some(most) = until_sure else {
             let red = |rendered: &Rendered| self.red(&sight, &self.verdicts(&sight, rendered, &all));
@@ -90,9 +89,9 @@ impl Studio<'_> {
     /// Renders the cases of a scene until their verdicts are decided. Returns how many
     /// replicates each has and which look that was.
     fn until_sure(&self, most: u32, sight: &Sight<'_>, rendered: &mut Rendered) -> Result<Counts, RunError> {
-        let (set, plan) = (self.set, self.set.subject.plan);
+        let (set, blocks) = (self.set, &sight.blocks);
         let mut counts = Counts::default();
-        let mut open: BTreeSet<u32> = set.subject.cases().map(|c| block(plan, c)).collect();
+        let mut open: BTreeSet<u32> = set.subject.cases().map(|c| blocks.of(c)).collect();
         let end = |rays: u32, replicates: u32, by: Budget| {
             let scene = set.scene.name.clone();
             Undecided { scene, rays, replicates, by }
@@ -100,7 +99,7 @@ impl Studio<'_> {
         let mut before = 0;
         for (look, n) in (1..).zip(looks(most)) {
             if look > 1 {
-                let is_spent = |b: &u32| self.is_spent(*b, n, rendered);
+                let is_spent = |b: &u32| self.is_spent(*b, n, blocks, rendered);
                 let (spent, rest): (BTreeSet<u32>, BTreeSet<u32>) = open.iter().copied().partition(is_spent);
                 counts.undecided.extend(spent.into_iter().map(|b| end(b, before, Budget::MaxTime)));
                 open = rest;
@@ -109,7 +108,7 @@ impl Studio<'_> {
                 return Ok(counts);
             }
             let units: Vec<Unit<'_>> =
-                set.subject.cases().filter(|c| open.contains(&block(plan, c))).map(Unit::Case).collect();
+                set.subject.cases().filter(|c| open.contains(&blocks.of(c))).map(Unit::Case).collect();
             if !self.means.stop.is_asked() {
                 self.render(&units, n, rendered)?;
             }
@@ -117,11 +116,11 @@ impl Studio<'_> {
                 counts.stopped = true;
                 return Ok(counts);
             }
-            for case in set.subject.cases().filter(|c| open.contains(&block(plan, c))) {
+            for case in set.subject.cases().filter(|c| open.contains(&blocks.of(c))) {
                 counts.set(case, n, look);
             }
             let verdicts = self.verdicts(sight, rendered, &counts);
-            let (undecided, kept) = self.undecided(&verdicts, sight.family);
+            let (undecided, kept) = self.undecided(sight, &verdicts, rendered, &counts);
             let closed = open.difference(&undecided).filter(|b| kept.contains(*b));
             counts.undecided.extend(closed.map(|b| end(*b, n, Budget::Floor)));
             open = open.intersection(&undecided).copied().collect();
@@ -139,9 +138,9 @@ impl Studio<'_> {
 
     /// Whether a block must do without another look, of `n` replicates. What is there
     /// already costs no time; in a merge that is all there is.
-    fn is_spent(&self, rays: u32, n: u32, rendered: &Rendered) -> bool {
-        let (plan, name) = (self.set.subject.plan, &self.set.scene.name);
+    fn is_spent(&self, rays: u32, n: u32, blocks: &Blocks<'_>, rendered: &Rendered) -> bool {
         if self.means.is_merge {
+            let name = &self.set.scene.name;
             let of = |e: &Undecided| e.scene == *name && e.rays == rays && e.replicates < n;
             return self.means.ended.iter().any(of);
         }
@@ -151,7 +150,7 @@ impl Studio<'_> {
             None => false,
         };
         self.until.is_some_and(|end| Instant::now() >= end)
-            && !self.set.subject.cases().filter(|c| block(plan, c) == rays).all(is_there)
+            && !self.set.subject.cases().filter(|c| blocks.of(c) == rays).all(is_there)
     }
 
     /// The verdicts on what there is of the scene.
@@ -172,15 +171,17 @@ impl Studio<'_> {
 
     /// The blocks with a verdict, or a warning, that more replicates may decide, and those with
     /// one that no number of them does.
-    fn undecided(&self, verdicts: &[Verdict], family: usize) -> (BTreeSet<u32>, BTreeSet<u32>) {
+    fn undecided(
+        &self,
+        sight: &Sight<'_>,
+        verdicts: &[Verdict],
+        rendered: &Rendered,
+        counts: &Counts,
+    ) -> (BTreeSet<u32>, BTreeSet<u32>) {
+        let error = |case: &Case| self.set.subject.classic_error(case, rendered, sight.judged, counts);
         let unsure = verdicts.iter().filter_map(|v| {
             let case = v.case.as_ref()?;
-            let p = [v.p_holds?.raw, v.p_broken?.raw];
-            let alpha = 1.0 - v.confidence;
-            let is_broken = decided([p[1], f64::NAN], family, v.spent, alpha);
-            let warns = |p: [f64; 2]| decided(p, family, v.spent, alpha);
-            let sure = is_broken || decided(p, family, v.spent, alpha) && warning(v).is_none_or(warns);
-            Some((block(self.set.subject.plan, case), v.can_be_decided(family))).filter(|_| !sure)
+            Some((sight.blocks.of(case), prospect(v, sight.family).or_else(|| unclear(v, error))?))
         });
         let (open, kept): (Vec<_>, Vec<_>) = unsure.partition(|(_, can_be_decided)| *can_be_decided);
         let blocks = |of: Vec<(u32, bool)>| of.into_iter().map(|(block, _)| block).collect();
@@ -200,6 +201,42 @@ impl Studio<'_> {
     }
 }
 
+/// Whether more replicates may decide a verdict with p-values: of the limit that fails, else of
+/// that which warns, the first that is open. None where neither is, and where there are none.
+fn prospect(v: &Verdict, family: usize) -> Option<bool> {
+    let p = [v.p_holds?.raw, v.p_broken?.raw];
+    let is_decided = |p| decided(p, family, v.spent, 1.0 - v.confidence);
+    let is_broken = is_decided([p[1], f64::NAN]);
+    let warns = v.warn.zip(warning(v)).filter(|_| !is_broken);
+    let mut limits = [(v.limit, p)].into_iter().chain(warns);
+    let (open, _) = limits.find(|(_, p)| !is_decided(*p))?;
+    Some(v.can_be_decided(open, family))
+}
+
+/// Whether more replicates may show a false highlight of classic AO where there is no telling
+/// yet, so that what is removed has no value. None where it has one, where there surely
+/// is none to remove, and where something else is missing. `error` is dK of classic AO beside a case.
+fn unclear(v: &Verdict, error: impl Fn(&Case) -> Option<Metric>) -> Option<bool> {
+    let may_show = |case: &Case| {
+        let (error, above_zero) = (Standing::of(&error(case)?)?, Limit::AtLeast(0.0));
+        let is_clear = |p| decided(p, 1, 1.0, 1.0 - CONFIDENCE);
+        Some(error.can_be_decided(above_zero, is_clear)).filter(|_| !is_clear(error.p(above_zero)))
+    };
+    let mut held = vec![(v.case.as_ref()?, &v.metric)];
+    if let Some(other) = &v.against {
+        let (case, metric) = (other.case.as_ref()?, other.metric.as_ref()?);
+        // A base record stays as it is.
+        if other.name != BASE {
+            held.push((case, metric));
+        } else if metric.value.is_none() {
+            return None;
+        }
+    }
+    let is_null = |m: &Metric| m.name == MetricName::Removed && m.value.is_none();
+    let open: Option<Vec<bool>> = held.iter().filter(|(_, m)| is_null(m)).map(|(case, _)| may_show(case)).collect();
+    open.filter(|all| !all.is_empty()).map(|all| all.into_iter().all(|may| may))
+}
+
 /// The p-values of what warns, that it is kept and that it is broken; None where nothing
 /// can warn.
 fn warning(verdict: &Verdict) -> Option<[f64; 2]> {
@@ -214,6 +251,8 @@ fn warning(verdict: &Verdict) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stats::Estimate;
+    use serde_json::json;
 
     #[test]
     fn looks_double_up_to_the_most() {
@@ -221,5 +260,50 @@ mod tests {
         assert_eq!(looks(50), [4, 8, 16, 32, 50]);
         assert_eq!(looks(4), [4]);
         assert_eq!(looks(2), [2]);
+    }
+
+    /// A verdict on what is removed, without p-values; what it is held against, and its value.
+    fn verdict(own: Option<f64>, other: Option<(&str, Option<f64>)>) -> Verdict {
+        let case = |name: &str| json!({ "scene": "s", "estimator": name, "renderer": "cpu", "rays": 4 });
+        let metric = |value: Option<f64>| json!({ "name": "removed", "value": value, "se": value, "df": value });
+        let mut text = json!({
+            "gate": "g", "scene": "s", "case": case("e"), "metric": metric(own), "limit": { "at-least": 0.5 },
+            "interval": null, "outcome": "inconclusive", "reason": ""
+        });
+        if let Some((name, value)) = other {
+            let difference = json!({ "value": null, "se": null, "df": null });
+            text["against"] =
+                json!({ "name": name, "case": case(name), "metric": metric(value), "difference": difference });
+        }
+        serde_json::from_value(text).unwrap()
+    }
+
+    #[test]
+    fn what_has_no_value_yet_is_open() {
+        let error = |value: f64, of_judge: f64| {
+            move |_: &Case| {
+                let part = Some(Estimate { value: 0.0, se: of_judge, df: 7.0 });
+                let whole = Estimate { value, se: 0.02, df: 7.0 };
+                Some(Metric::new(MetricName::ContrastError, None, Ok(whole)).with_floor(part))
+            }
+        };
+        let null = verdict(None, None);
+        assert_eq!(unclear(&null, error(0.03, 0.005)), Some(true));
+        assert_eq!(unclear(&null, error(0.03, 0.0199)), Some(false));
+        // It surely is there, and has no value for another reason; surely is not; is not known.
+        for sure in [0.1, -0.1] {
+            assert_eq!(unclear(&null, error(sure, 0.005)), None);
+        }
+        assert_eq!(unclear(&null, |_| None), None);
+        // The other's may be what is missing. That of a base record is for good.
+        for (own, other, open) in [
+            (Some(0.6), None, None),
+            (Some(0.6), Some(("other", None)), Some(true)),
+            (None, Some(("other", None)), Some(true)),
+            (None, Some((BASE, Some(0.6))), Some(true)),
+            (None, Some((BASE, None)), None),
+        ] {
+            assert_eq!(unclear(&verdict(own, other), error(0.03, 0.005)), open, "{own:?} {other:?}");
+        }
     }
 }

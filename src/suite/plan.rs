@@ -141,7 +141,7 @@ impl<'a> Plan<'a> {
 
     /// The case of another estimator that gates hold a case against: in the same scene on
     /// the same renderer, of as many rays, else of the most.
-    fn beside(&self, case: &Case, other: &str) -> Option<&Case> {
+    pub(crate) fn beside(&self, case: &Case, other: &str) -> Option<&Case> {
         let theirs =
             self.cases.iter().filter(|c| c.estimator == other && c.scene == case.scene && c.renderer == case.renderer);
         theirs.max_by_key(|c| (c.rays == case.rays, c.rays))

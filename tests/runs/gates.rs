@@ -308,7 +308,7 @@ fn the_noise_of_a_base_is_not_promised_away() {
         let floor = v.floor.unwrap();
         let theirs = v.against.as_ref().unwrap().metric.as_ref().unwrap().se.unwrap();
         assert!(floor.se > theirs && floor.se < v.se().unwrap(), "{v:?}");
-        assert!(v.is_kept_by_floor(2) && !v.can_be_decided(2), "{v:?}");
+        assert!(v.is_kept_by_floor(2) && !v.can_be_decided(v.limit, 2), "{v:?}");
         let says = "more replicates of the case would not decide: the noise of the base record and of the judge";
         assert!(v.reason.contains(says), "{}", v.reason);
     }

@@ -392,3 +392,107 @@ fn it_ends_where_replicates_cannot_decide() {
         assert!(reason.contains("would not decide: the noise of the converged image is too large"), "{reason}");
     }
 }
+
+/// The same noise, and it is only what warns that it keeps open.
+#[test]
+fn it_ends_where_replicates_cannot_decide_what_warns() {
+    let out = out("floor-warns");
+    let head = ARCADE.split("[[gate]]").next().unwrap();
+    let head = head.replace("\"curtain-arcade\", \"plane\"", "\"curtain-open\"");
+    let head = head.replace("converged_rays = 64", "converged_rays = 16");
+    let gate = "[[gate]]\nname = \"g\"\nmetric = \"bias\"\nregion = \"footprint\"\nmax = 0.5\nwarn = { max = 0.003 }\n";
+    fs::write(DIR.path().join("floor-warns.toml"), head + gate).unwrap();
+    ok(&command_of("floor-warns.toml", "1024", &out, &[]).output().unwrap());
+    let record = record(&out);
+    let (replicates, _) = counts(&record, "curtain-open").pop_first().unwrap();
+    assert!(replicates <= 64, "{replicates}");
+    let ended = json!([{ "scene": "curtain-open", "rays": 4, "replicates": replicates, "by": "floor" }]);
+    assert_eq!(record["until_sure"]["undecided"], ended);
+    assert_eq!(record["verdicts"][0]["outcome"], "pass");
+}
+
+/// A curtain before a wall, where the false highlight of classic AO is weak.
+const WALL: &str = r#"
+description = "x"
+[ao]
+radius = 0.25
+[environment]
+radiance = 1.0
+[measure]
+center = [0, 0, 0]
+normal = [0, 1, 0]
+transect = [1, 0, 0]
+clearance = 0.08
+resolution = [104, 16]
+[look]
+eye = [0.75, 0.42, 1.15]
+target = [0, 0.08, 0]
+resolution = [32, 32]
+[[object]]
+name = "ground"
+shape = { plane = { center = [0, 0, 0], u = [0, 0, 12], v = [12, 0, 0] } }
+[[object]]
+name = "wall"
+shape = { plane = { center = [-0.5, 1.5, 0], u = [0, 1.5, 0], v = [0, 0, 8] } }
+[[object]]
+name = "curtain"
+occluder = true
+shape = { curtain = { thickness = 0.02, gap = 0.10, height = 1.0, length = 6.0 } }
+"#;
+
+/// What is removed has no value while there is no telling whether there is anything to remove.
+#[test]
+fn what_has_no_value_yet_is_looked_at_again() {
+    fs::write(DIR.path().join("wall.toml"), WALL).unwrap();
+    let head = SUITE.split("[[gate]]").next().unwrap().replace("rays = [4, 16]", "rays = [1]");
+    let head = head.replace("converged_rays = 256", "converged_rays = 64").replace("\"clipped\"", "\"counts\"");
+    let rendered = |scene: &str, seed: &str, judge: &str| {
+        let head = head.replace("\"plane\", \"curtain-open\"", &format!("\"{scene}\""));
+        let head = head.replace("precision = 1.0, paths = 1, replicates = 8, max_replicates = 8", judge);
+        let gate = "[[gate]]\nname = \"g\"\nmetric = \"removed\"\nestimators = [\"extended\"]\nmin = 0.1\n";
+        fs::write(DIR.path().join("removed.toml"), head + gate).unwrap();
+        let out = out(&format!("removed-{seed}"));
+        command_of("removed.toml", "256", &out, &["--seed", seed]).output().unwrap();
+        record(&out)
+    };
+    let good = "precision = 0.1, paths = 8, replicates = 16, max_replicates = 16";
+    let wall = rendered("wall.toml", "5", good);
+    let (replicates, _) = counts(&wall, "wall").pop_first().unwrap();
+    assert!(replicates > 4, "{}", wall["verdicts"]);
+    assert_eq!(wall["verdicts"][0]["outcome"], "pass", "{}", wall["verdicts"]);
+    assert_eq!(wall["until_sure"]["undecided"], json!([]));
+
+    // The noise of this judge hides it for good, and that is told.
+    let hidden = rendered("wall.toml", "1", "precision = 1.0, paths = 1, replicates = 4, max_replicates = 4");
+    let (replicates, _) = counts(&hidden, "wall").pop_first().unwrap();
+    assert!(replicates <= 64 && hidden["verdicts"][0]["metric"]["value"].is_null(), "{}", hidden["verdicts"]);
+    let ended = json!([{ "scene": "wall", "rays": 1, "replicates": replicates, "by": "floor" }]);
+    assert_eq!(hidden["until_sure"]["undecided"], ended);
+
+    // Under the open sky there surely is nothing to remove.
+    let none = rendered("curtain-open", "2", good);
+    assert_eq!(counts(&none, "curtain-open"), BTreeSet::from([(4, 1)]));
+    assert!(none["verdicts"][0]["metric"]["value"].is_null());
+    assert_eq!(none["until_sure"]["undecided"], json!([]));
+}
+
+/// The first gate is decided at once; that of the other estimator, of rays of its own, never is.
+#[test]
+fn cases_held_against_each_other_end_together() {
+    let out = out("together");
+    let head = SUITE.split("[[gate]]").next().unwrap().replace("\"plane\", ", "");
+    let gate = "[[gate]]\nmetric = \"openness\"\nregion = \"footprint\"\n";
+    let first =
+        format!("{gate}name = \"a\"\nestimators = [\"classic\"]\nrays = [4]\nagainst = \"extended\"\nmax = 0.9\n");
+    let never = format!("{gate}name = \"b\"\nestimators = [\"extended\"]\nequals = 0.7\nwithin = 1e-6\n");
+    let text = format!("{head}rays = 16\n{first}{}", never.replace("equals = 0.7", "equals = 0.69"));
+    fs::write(DIR.path().join("together.toml"), text).unwrap();
+    command_of("together.toml", "16", &out, &[]).output().unwrap();
+    let record = record(&out);
+    assert_eq!(counts(&record, "curtain-open"), BTreeSet::from([(16, 3)]));
+    let first = record["verdicts"].as_array().unwrap().iter().find(|v| v["gate"] == "a").unwrap();
+    assert_eq!(first["outcome"], "pass", "{first}");
+    assert!((first["spent"].as_f64().unwrap() - aogauge::stats::spending(3)).abs() < 1e-12, "{first}");
+    let ended = json!([{ "scene": "curtain-open", "rays": 4, "replicates": 16, "by": "max-replicates" }]);
+    assert_eq!(record["until_sure"]["undecided"], ended);
+}
