@@ -192,6 +192,8 @@ function store() {
 
 async function review() {
   const child = spawn(aogauge, ["golden", "review", record, "--goldens", goldens, "--all"], { stdio: ["ignore", "pipe", "inherit"] });
+  // Where a check fails nobody else ends it.
+  process.on("exit", () => child.kill());
   const ended = new Promise((resolve) => child.on("exit", resolve));
   const address = await new Promise((resolve) => child.stdout.on("data", (d) => resolve(String(d).trim())));
   assert(/^http:\/\/127\.0\.0\.1:\d+\/\?token=[0-9a-f]{64}$/.test(address), address);

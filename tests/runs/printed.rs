@@ -63,7 +63,7 @@ fn reasons_and_errors_of_goldens_are_text() {
     assert_eq!(listed.matches("aogauge y ::error ::y [31m").count(), 2, "{listed}");
     assert_eq!(listed.lines().filter(|l| l.trim_start().starts_with("y ::error ::y [31m")).count(), 2, "{listed}");
     let listed = data(&["golden", "list", "--format", "json", at[0], at[1]]);
-    assert_eq!(listed["goldens"][0]["golden"]["provenance"]["reason"], HOSTILE);
+    assert_eq!(listed["goldens"][0]["golden"]["reason"], HOSTILE);
 
     let name = ["scene", "estimator", "renderer"].map(|part| case["case"][part].as_str().unwrap()).join("/");
     let name = format!("{name}/{}", case["case"]["rays"]);
