@@ -192,6 +192,8 @@ function store() {
 
 async function review() {
   const child = spawn(aogauge, ["golden", "review", record, "--goldens", goldens, "--all"], { stdio: ["ignore", "pipe", "inherit"] });
+  // Where a check fails nobody else ends it.
+  process.on("exit", () => child.kill());
   const ended = new Promise((resolve) => child.on("exit", resolve));
   const address = await new Promise((resolve) => child.stdout.on("data", (d) => resolve(String(d).trim())));
   assert(/^http:\/\/127\.0\.0\.1:\d+\/\?token=[0-9a-f]{64}$/.test(address), address);
@@ -219,6 +221,44 @@ async function review() {
   assert.equal(rejected.length, 1);
   assert.equal(rejected[0].reason, "too dark at the hem");
   did("reject leaves the golden and keeps the reason");
+  const rows = page.locator("#list .row");
+  const [scene, one, all] = [(await page.locator("#stage h2").innerText()).match(/(\S+)\/.*\/.*\//)[1], page.locator("#filters input[value=fail]"), await rows.count()];
+  await one.check();
+  await page.locator("select[name=scene]").selectOption(scene);
+  await page.locator("#filters [type=search]").fill(scene);
+  assert.equal(await rows.count(), 1);
+  await page.locator("#reason").fill("right after all");
+  await page.locator("#approve").click();
+  await page.locator("#decided", { hasText: "Approved:" }).waitFor();
+  assert.equal(await one.count(), 0, "nothing fails, and there is a box for it");
+  assert.equal(await page.locator("#filters input:checked").count(), 0);
+  assert.equal(await rows.count(), 1, "what was approved has left the list");
+  assert.equal(await page.locator("select[name=scene]").inputValue(), scene);
+  assert.equal(await page.locator("#filters [type=search]").inputValue(), scene);
+  await page.locator("#filters [type=search]").fill("");
+  await page.locator("select[name=scene]").selectOption("");
+  assert.equal(await rows.count(), all);
+  did("a decision leaves the filters as they are shown, and takes away one that nothing passes any more");
+
+  let release;
+  const held = new Promise((resolve) => { release = resolve; });
+  await page.route("**/decide", async (route) => { await held; await route.continue(); });
+  const badge = page.locator("#stage h2 .badge");
+  await page.locator("#reason").fill("wrong after all");
+  await page.locator("#reject").click();
+  const rejectedCase = await page.locator("#stage h2").innerText();
+  await page.keyboard.press("k");
+  assert.notEqual(await page.locator("#stage h2").innerText(), rejectedCase);
+  assert.equal(await badge.innerText(), "PASS");
+  release();
+  await page.locator("#list .badge.fail").waitFor();
+  assert.equal(await badge.innerText(), "PASS", "the badge of another case");
+  await page.locator("#stage").focus();
+  await page.keyboard.press("j");
+  assert.equal(await badge.innerText(), "FAIL");
+  assert((await page.locator("#decided").innerText()).startsWith("Rejected:"));
+  did("an answer that comes late is shown with its own case");
+
   await page.locator("#finish").click();
   assert.deepEqual(faults, []);
   await ended;

@@ -11,7 +11,7 @@ fn main() -> ExitCode {
         Err(failure) => {
             #[allow(clippy::print_stderr)] // errors are for people
             {
-                eprintln!("aogauge: {}", failure.message);
+                eprintln!("aogauge: {failure}");
             }
             failure.exit
         }

@@ -31,6 +31,12 @@ pub(crate) fn logged(text: &str) -> String {
     }
 }
 
+/// Several lines of a log, each [`logged`]. Breaks of lines stay: where one text of others may hold them, [`logged`]
+/// comes first.
+pub(crate) fn logged_lines(text: &str) -> String {
+    text.split('\n').map(logged).collect::<Vec<_>>().join("\n")
+}
+
 /// At most so many characters, the last of them an ellipsis where more are cut off.
 pub(crate) fn cut(text: &str, characters: usize) -> Cow<'_, str> {
     match text.char_indices().nth(characters) {
@@ -116,6 +122,11 @@ mod tests {
         ] {
             assert_eq!(logged(text), expected);
         }
+    }
+
+    #[test]
+    fn lines_of_a_log_hold_no_commands_either() {
+        assert_eq!(logged_lines("a: x\n ::error::y\u{1b}[31m\n\n"), "a: x\n: :error::y [31m\n\n");
     }
 
     #[test]

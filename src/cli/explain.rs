@@ -143,7 +143,7 @@ impl Explanation {
     fn plain(&self) -> String {
         let mut text = self.title.to_owned();
         if let Some(subject) = &self.subject {
-            text += &format!("  {subject}");
+            text += &format!("  {}", logged(subject));
         }
         text.push('\n');
         let gate = self.gate.iter().map(|g| format!("Gate: {g}"));
@@ -154,10 +154,11 @@ impl Explanation {
     }
 }
 
-/// Lines of at most [`WIDTH`] characters, indented by two; a longer word has its own.
+/// Lines of at most [`WIDTH`] characters, indented by two; a longer word has its own. None is a command to GitHub's
+/// runner, though a word within the text may look like the beginning of one.
 fn wrap(text: &str) -> String {
     let (mut lines, mut column) = (String::from("  "), 2);
-    for word in text.split_whitespace() {
+    for word in text.split_whitespace().map(logged) {
         let length = word.chars().count();
         if column > 2 && column + 1 + length > WIDTH {
             lines += "\n    ";
@@ -166,7 +167,7 @@ fn wrap(text: &str) -> String {
             lines.push(' ');
             column += 1;
         }
-        lines += word;
+        lines += &word;
         column += length;
     }
     lines + "\n"

@@ -25,8 +25,10 @@ use crate::{
     run::RunError,
     scenes::SceneError,
     suite::SuiteError,
+    untrusted::logged_lines,
 };
 use clap::{Parser, Subcommand, ValueEnum};
+use std::fmt;
 
 /// How a command ended, as the shell sees it. Where several hold, the first of
 /// 2, 4, 5, 3, 1, 6, 0.
@@ -121,6 +123,13 @@ impl Failure {
     }
 }
 
+/// The message, as a log may hold it: it may quote what others wrote.
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&logged_lines(&self.message))
+    }
+}
+
 macro_rules! usage {
     ($($error:ty),*) => {$(
         impl From<$error> for Failure {
@@ -190,9 +199,14 @@ fn print(text: &str) -> Result<(), Failure> {
     }
 }
 
-/// Prints for people on standard error.
-#[allow(clippy::print_stderr)] // the one place that does
+/// Prints for people on standard error. Whatever the text quotes, no line of it is a command to GitHub's runner.
 fn tell(text: &str) {
+    tell_raw(&logged_lines(text));
+}
+
+/// Prints on standard error as it is: commands to GitHub's runner, which are meant.
+#[allow(clippy::print_stderr)] // the one place that does
+fn tell_raw(text: &str) {
     eprintln!("{text}");
 }
 

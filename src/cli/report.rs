@@ -1,6 +1,6 @@
 //! `aogauge report`, and the reports that `run` and `merge` write.
 
-use super::{Exit, Failure, Format as Printed, json, print, tell};
+use super::{Exit, Failure, Format as Printed, json, print, tell, tell_raw};
 use crate::{
     disk::is_same,
     record::Record,
@@ -161,7 +161,7 @@ impl Wanted<'_> {
         let written = github::write(record, self.images, github_file().as_deref(), self.out)?;
         let lines: String = github::annotations(record).into_iter().map(|line| line + "\n").collect();
         if is_read {
-            tell(lines.trim_end());
+            tell_raw(lines.trim_end());
         } else {
             print(&lines)?;
         }

@@ -24,6 +24,7 @@ use crate::{
     report,
     run::{Means, Observer, Prepared, Shard, ShardRecord, Stop},
     suite::{Plan, Platform, Suite},
+    untrusted::{line, logged},
 };
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -135,7 +136,7 @@ impl Observer for Bar {
     fn step(&self, done: u64, total: u64, what: &str) {
         self.0.set_length(total);
         self.0.set_position(done);
-        self.0.set_message(what.to_owned());
+        self.0.set_message(line(what));
     }
 }
 
@@ -302,7 +303,7 @@ fn tell_ended(record: &Record) {
     let ended: Vec<String> =
         record.cases.iter().filter_map(|c| Some(format!("{}: {}", c.case.id(), c.error.as_ref()?))).collect();
     for why in ended.iter().take(MOST_ENDED) {
-        tell(&format!("aogauge: {why}"));
+        tell(&format!("aogauge: {}", logged(why)));
     }
     if ended.len() > MOST_ENDED {
         tell(&format!(
@@ -315,7 +316,7 @@ fn tell_ended(record: &Record) {
 /// Makes the reports, and says how it went.
 pub(super) fn finish(record: &Record, folder: &RecordFolder, beside: &Beside, format: Format) -> Result<Exit, Failure> {
     for doubt in record.doubts() {
-        tell(&format!("aogauge: {doubt}"));
+        tell(&format!("aogauge: {}", logged(&doubt)));
     }
     tell_ended(record);
     let files = beside.make(record, folder.path(), format)?;
@@ -344,7 +345,7 @@ pub(super) fn finish(record: &Record, folder: &RecordFolder, beside: &Beside, fo
 
 fn end_of_shard(args: &Args, record: &ShardRecord, folder: &RecordFolder) -> Result<Exit, Failure> {
     let failed = record.units.iter().filter(|d| d.error.is_some()).count();
-    let end = record.incomplete.as_ref().map_or_else(String::new, |why| format!("; {why}"));
+    let end = record.incomplete.as_ref().map_or_else(String::new, |why| format!("; {}", logged(why)));
     tell(&format!(
         "shard {}: {} rendered, {failed} of them failed{end}\n{}: to be merged with the others (aogauge merge)",
         record.shard,

@@ -13,6 +13,7 @@ use crate::{
     record::RecordFolder,
     run::{References, ReferencesError},
     score::{self, CurveChoice, Declaration, Fit, KnownCurve, ScoreError},
+    untrusted::logged,
 };
 use serde::de::{
     DeserializeOwned, IntoDeserializer,
@@ -148,7 +149,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     };
     let gathered = score::gather(&args.images, &references, &declaration, args.partial)?;
     for warning in &gathered.handed_in.warnings {
-        tell(&format!("aogauge: {warning}"));
+        tell(&format!("aogauge: {}", logged(warning)));
     }
     let scored =
         references.ready(&gathered.cases, gates.as_ref().map(|(label, text)| (label.as_str(), text.as_str())))?;

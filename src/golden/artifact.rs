@@ -24,6 +24,15 @@ const LARGEST_TOTAL: u64 = 8 << 30;
 /// of archive are no image.
 const MAX_RATIO: u64 = 100;
 
+/// What is taken out of an archive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Wanted {
+    /// What goldens are made of and held against.
+    Goldens,
+    /// What a review shows, too.
+    Review,
+}
+
 /// A record's folder, or a copy of what goldens need out of an archive.
 #[derive(Debug)]
 pub struct Candidates {
@@ -35,12 +44,26 @@ pub struct Candidates {
 impl Candidates {
     /// A record by its folder or a zip file that holds one, at its top or in a folder.
     /// Of an archive only the record's own files are read, by the names the record
-    /// gives; no name in the archive becomes a path here.
+    /// gives; no name in the archive becomes a path here. Those are the images of cases, and of
+    /// scenes for their regions.
     ///
     /// # Errors
     /// Where there is no such file, it is no zip file or holds no record or several,
-    /// lacks a file of the record, or holds more than a record can.
+    /// lacks one of these files, or holds more than a record can.
     pub fn open(path: &Path) -> Result<Self, DiskError> {
+        Self::with(path, Wanted::Goldens)
+    }
+
+    /// The same with what is shown beside images that are looked at: the judge's images and those of look views. An
+    /// archive may lack them.
+    ///
+    /// # Errors
+    /// As [`Candidates::open`].
+    pub fn open_for_review(path: &Path) -> Result<Self, DiskError> {
+        Self::with(path, Wanted::Review)
+    }
+
+    fn with(path: &Path, wanted: Wanted) -> Result<Self, DiskError> {
         if !path.is_file() {
             return Ok(Candidates { folder: path.to_owned(), _unpacked: None });
         }
@@ -48,7 +71,7 @@ impl Candidates {
             .prefix("aogauge-record-")
             .tempdir()
             .map_err(DiskError::io(&std::env::temp_dir(), "make a temporary folder"))?;
-        unpack(path, unpacked.path())?;
+        unpack(path, unpacked.path(), wanted)?;
         Ok(Candidates { folder: unpacked.path().to_owned(), _unpacked: Some(unpacked) })
     }
 
@@ -65,9 +88,9 @@ impl Candidates {
     }
 }
 
-fn unpack(path: &Path, folder: &Path) -> Result<(), DiskError> {
+fn unpack(path: &Path, folder: &Path, wanted: Wanted) -> Result<(), DiskError> {
     let file = File::open(path).map_err(DiskError::io(path, "read the archive"))?;
-    let mut archive = ZipArchive::new(BufReader::new(file))
+    let archive = ZipArchive::new(BufReader::new(file))
         .map_err(|e| DiskError::content(path, format!("neither a record's folder nor a readable zip file: {e}")))?;
     if archive.len() > MOST_ENTRIES {
         return Err(DiskError::content(
@@ -76,23 +99,49 @@ fn unpack(path: &Path, folder: &Path) -> Result<(), DiskError> {
         ));
     }
     let prefix = prefix(path, &archive)?;
-    let mut total = 0;
-    let mut take = |name: &str, most: u64, ratio: u64| -> Result<(), DiskError> {
-        let full = format!("{prefix}{name}");
-        let missing = |e: zip::result::ZipError| DiskError::content(path, format!("cannot read '{full}': {e}"));
-        let mut entry = archive.by_name(&full).map_err(missing)?;
-        let most = most.min(entry.compressed_size().saturating_mul(ratio).saturating_add(1 << 20));
-        let most = most.min(LARGEST_TOTAL - total);
-        total += copy(&mut entry, &folder.join(name), most)
-            .map_err(|e| DiskError::content(path, format!("cannot unpack '{full}': {e}")))?;
-        Ok(())
-    };
-    take(record::FILE, LARGEST_RECORD, u64::MAX)?;
+    let mut from = Unpacking { path, archive, prefix, folder, total: 0 };
+    from.take(record::FILE, LARGEST_RECORD, u64::MAX)?;
     // It refuses paths that lead out of the folder.
     let record = Record::read(folder)?;
     let of_cases = record.cases.iter().filter_map(|c| c.image.as_deref());
-    let files: BTreeSet<&str> = of_cases.chain(record.scenes.iter().map(|s| s.image.as_str())).collect();
-    files.into_iter().try_for_each(|name| take(name, LARGEST_IMAGE, MAX_RATIO))
+    let mut files: BTreeSet<&str> = of_cases.chain(record.scenes.iter().map(|s| s.image.as_str())).collect();
+    if wanted == Wanted::Review {
+        let judged = record.scenes.iter().filter_map(|s| Some(s.judge.as_ref()?.image.as_str()));
+        let beside = judged.chain(record.scenes.iter().map(|s| s.look.as_str()));
+        files.extend(beside.filter(|name| from.holds(name)));
+    }
+    files.into_iter().try_for_each(|name| from.take(name, LARGEST_IMAGE, MAX_RATIO))
+}
+
+/// An archive, and the folder that the record's files are copied to.
+struct Unpacking<'a> {
+    path: &'a Path,
+    archive: ZipArchive<BufReader<File>>,
+    /// What stands before the names of the record's files.
+    prefix: String,
+    folder: &'a Path,
+    /// Bytes copied so far.
+    total: u64,
+}
+
+impl Unpacking<'_> {
+    fn holds(&self, name: &str) -> bool {
+        self.archive.index_for_name(&format!("{}{name}", self.prefix)).is_some()
+    }
+
+    /// Copies a file of the record: at most `most` bytes, and beyond the first MiB `ratio` for a byte of archive.
+    fn take(&mut self, name: &str, most: u64, ratio: u64) -> Result<(), DiskError> {
+        let full = format!("{}{name}", self.prefix);
+        let mut entry = self
+            .archive
+            .by_name(&full)
+            .map_err(|e| DiskError::content(self.path, format!("cannot read '{full}': {e}")))?;
+        let most = most.min(entry.compressed_size().saturating_mul(ratio).saturating_add(1 << 20));
+        let most = most.min(LARGEST_TOTAL - self.total);
+        self.total += copy(&mut entry, &self.folder.join(name), most)
+            .map_err(|e| DiskError::content(self.path, format!("cannot unpack '{full}': {e}")))?;
+        Ok(())
+    }
 }
 
 /// What stands before the names of the record's files.

@@ -23,7 +23,7 @@ pub(super) fn html(review: &Review, token: &str) -> Result<String, ReportError> 
         // Cases stand scene by scene, so each scene is read once.
         let mut of_scene = match images.take() {
             Some((own, read)) if own.name == scene.name => read,
-            _ => SceneImages::read(&review.folder, record, scene)?,
+            _ => SceneImages::found(&review.folder, record, scene)?,
         };
         items.push(item(review, checked, case, &mut of_scene, &mut planes)?);
         images = Some((scene, of_scene));
@@ -45,7 +45,7 @@ pub(super) fn html(review: &Review, token: &str) -> Result<String, ReportError> 
         },
         label: None,
         summary: found.summary(),
-        notes: found.stale.iter().map(crate::golden::Stale::line).collect(),
+        notes: found.stale.iter().map(crate::golden::Stale::line).chain(lacking(review)).collect(),
         gates: Vec::new(),
         items,
         scenes: Vec::new(),
@@ -55,6 +55,19 @@ pub(super) fn html(review: &Review, token: &str) -> Result<String, ReportError> 
         review: Some(viewer::Review { token: token.to_owned(), store }),
     };
     Ok(page.html(&planes)?)
+}
+
+/// Says that the record's folder is not whole.
+fn lacking(review: &Review) -> Option<String> {
+    let scenes = &review.record().scenes;
+    let images = scenes.iter().flat_map(|s| s.judge.iter().map(|j| &j.image).chain([&s.look]));
+    let lacking = images.filter(|image| !review.folder.join(image).exists()).count();
+    (lacking > 0).then(|| {
+        format!(
+            "The record lacks {} of the judge or of look views: what is compared with them is not shown.",
+            counted(lacking, "image", "images")
+        )
+    })
 }
 
 fn facts(record: &Record, store: &str) -> Vec<[String; 2]> {

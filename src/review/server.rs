@@ -55,8 +55,7 @@ pub enum Ended {
 struct Served {
     review: Arc<Mutex<Review>>,
     token: Arc<str>,
-    /// `127.0.0.1:PORT`.
-    host: Arc<str>,
+    port: u16,
     finished: Arc<Notify>,
 }
 
@@ -84,11 +83,11 @@ pub fn serve(review: Review, port: u16, ready: impl FnOnce(&str)) -> Result<(End
     let token = token()?;
     runtime.block_on(async {
         let listener = TcpListener::bind(address).await.map_err(fail)?;
-        let host = listener.local_addr().map_err(fail)?.to_string();
+        let own = listener.local_addr().map_err(fail)?;
         let served = Served {
             review: Arc::new(Mutex::new(review)),
             token: token.as_str().into(),
-            host: host.as_str().into(),
+            port: own.port(),
             finished: Arc::new(Notify::new()),
         };
         let end = Arc::new(Mutex::new(Ended::Interrupted));
@@ -99,7 +98,7 @@ pub fn serve(review: Review, port: u16, ready: impl FnOnce(&str)) -> Result<(End
                 _ = tokio::signal::ctrl_c() => {}
             }
         };
-        ready(&format!("http://{host}/?token={token}"));
+        ready(&format!("http://{own}/?token={token}"));
         axum::serve(listener, router(served.clone())).with_graceful_shutdown(stop).await.map_err(fail)?;
         let end = *end.lock().unwrap_or_else(PoisonError::into_inner);
         // Whoever asks last may still hold it.
@@ -129,12 +128,8 @@ fn token() -> Result<String, ReviewError> {
 /// caches, frames and other pages' hands.
 async fn guard(State(served): State<Served>, request: Request, next: Next) -> Response {
     let headers = request.headers();
-    let text = |name: HeaderName| headers.get(name).map(|v| v.to_str().unwrap_or_default().to_owned());
-    let port = served.host.rsplit(':').next().unwrap_or_default();
-    let hosts = [served.host.to_string(), format!("localhost:{port}")];
-    let is_host = text(header::HOST).is_some_and(|h| hosts.contains(&h));
-    let is_own = text(header::ORIGIN).is_none_or(|o| hosts.iter().any(|h| o == format!("http://{h}")));
-    let mut response = if is_host && is_own {
+    let text = |name: HeaderName| headers.get(name).map(|v| v.to_str().unwrap_or_default());
+    let mut response = if is_own(served.port, text(header::HOST), text(header::ORIGIN)) {
         next.run(request).await
     } else {
         refused("this review is served to its own page alone")
@@ -148,6 +143,16 @@ async fn guard(State(served): State<Served>, request: Request, next: Next) -> Re
         response.headers_mut().insert(name, HeaderValue::from_static(value));
     }
     response
+}
+
+/// Whether a request names this server as its host, and no page but its own as its origin, where it names one.
+/// Browsers leave out port 80, the default of HTTP.
+fn is_own(port: u16, host: Option<&str>, origin: Option<&str>) -> bool {
+    let is_here = |name: &str| {
+        let end = ["127.0.0.1", "localhost"].iter().find_map(|own| name.strip_prefix(own));
+        end.is_some_and(|end| end == format!(":{port}") || port == 80 && end.is_empty())
+    };
+    host.is_some_and(is_here) && origin.is_none_or(|o| o.strip_prefix("http://").is_some_and(is_here))
 }
 
 fn refused(why: &str) -> Response {
@@ -202,4 +207,31 @@ fn may_decide(served: &Served, headers: &HeaderMap) -> bool {
 
 fn answer(status: StatusCode, message: &str, outcome: &str) -> Response {
     (status, Json(serde_json::json!({ "message": message, "outcome": outcome }))).into_response()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_own;
+
+    #[test]
+    fn the_port_may_be_left_out_where_it_is_http_s_own() {
+        for port in [80, 8080] {
+            for name in ["127.0.0.1", "localhost"] {
+                let with = format!("{name}:{port}");
+                let origins = [name, &with].map(|n| format!("http://{n}"));
+                assert!(is_own(port, Some(&with), None) && is_own(port, Some(&with), Some(&origins[1])));
+                assert_eq!(is_own(port, Some(name), None), port == 80, "{name} {port}");
+                assert_eq!(is_own(port, Some(name), Some(&origins[0])), port == 80, "{name} {port}");
+            }
+        }
+        for host in
+            ["", ":80", "127.0.0.1:", "127.0.0.1:8080", "127.0.0.1.evil.example", "evil.example", "127.0.0.1:80:80"]
+        {
+            assert!(!is_own(80, Some(host), None), "{host}");
+        }
+        for origin in ["", "null", "127.0.0.1", "https://127.0.0.1", "http://127.0.0.1:81", "http://evil.example"] {
+            assert!(!is_own(80, Some("127.0.0.1"), Some(origin)), "{origin}");
+        }
+        assert!(!is_own(80, None, None));
+    }
 }

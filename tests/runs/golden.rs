@@ -40,7 +40,7 @@ fn command(args: &[&str]) -> Command {
     command
 }
 
-fn aogauge(args: &[&str]) -> Output {
+pub(super) fn aogauge(args: &[&str]) -> Output {
     command(args).output().unwrap()
 }
 
@@ -56,19 +56,19 @@ fn stdout(args: &[&str]) -> String {
     String::from_utf8(aogauge(args).stdout).unwrap()
 }
 
-fn text(path: &Path) -> &str {
+pub(super) fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-struct Runs {
+pub(super) struct Runs {
     _dir: TempDir,
-    suite: PathBuf,
+    pub(super) suite: PathBuf,
     /// Seeds 1 and 2.
-    out: [PathBuf; 2],
+    pub(super) out: [PathBuf; 2],
 }
 
 /// Two records for all tests.
-static RUNS: LazyLock<Runs> = LazyLock::new(|| {
+pub(super) static RUNS: LazyLock<Runs> = LazyLock::new(|| {
     let dir = tempfile::tempdir().unwrap();
     fs::write(dir.path().join("scene.toml"), SCENE).unwrap();
     let suite = dir.path().join("suite.toml");
@@ -81,7 +81,7 @@ static RUNS: LazyLock<Runs> = LazyLock::new(|| {
     Runs { _dir: dir, suite, out }
 });
 
-fn copied(from: &Path, to: &Path) {
+pub(super) fn copied(from: &Path, to: &Path) {
     fs::create_dir_all(to).unwrap();
     for entry in fs::read_dir(from).unwrap() {
         let path = entry.unwrap().path();
@@ -90,7 +90,7 @@ fn copied(from: &Path, to: &Path) {
     }
 }
 
-fn edited(out: &Path, change: impl FnOnce(&mut Value)) {
+pub(super) fn edited(out: &Path, change: impl FnOnce(&mut Value)) {
     let path = out.join("record.json");
     let mut record = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
     change(&mut record);
@@ -649,7 +649,7 @@ fn many_cases_moved_alike_are_called_stale() {
 }
 
 /// Everything in a folder as a zip, under a prefix.
-fn zipped(from: &Path, to: &Path, prefix: &str) {
+pub(super) fn zipped(from: &Path, to: &Path, prefix: &str) {
     let mut zip = ZipWriter::new(File::create(to).unwrap());
     let mut folders = vec![from.to_owned()];
     while let Some(folder) = folders.pop() {

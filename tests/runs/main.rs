@@ -7,6 +7,7 @@
 mod gates;
 mod golden;
 mod golden_assert;
+mod printed;
 mod report;
 mod report_formats;
 mod report_html;

@@ -33,12 +33,12 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-fn stored() -> Record {
+pub(super) fn stored() -> Record {
     Record::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/records/v4")).unwrap()
 }
 
 /// Writes a record's folder without images.
-fn written(dir: &Path, record: &impl serde::Serialize) -> PathBuf {
+pub(super) fn written(dir: &Path, record: &impl serde::Serialize) -> PathBuf {
     let folder = dir.join("record");
     fs::create_dir_all(&folder).unwrap();
     fs::write(folder.join("record.json"), serde_json::to_string(record).unwrap()).unwrap();

@@ -1,5 +1,6 @@
 //! `golden review` as a browser meets it, and as somebody does who should not.
 
+use super::golden::{copied, zipped};
 use serde_json::{Value, json};
 use std::{
     io::{BufRead, BufReader, Read, Write},
@@ -41,8 +42,13 @@ struct Review {
 
 impl Review {
     fn begin(goldens: &Path, more: &[&str]) -> Review {
+        Review::of(Path::new("2"), goldens, more)
+    }
+
+    fn of(record: &Path, goldens: &Path, more: &[&str]) -> Review {
         let mut command = Command::new(env!("CARGO_BIN_EXE_aogauge"));
-        command.current_dir(RECORDS.path()).args(["golden", "review", "2", "--goldens"]).arg(goldens).args(more);
+        command.current_dir(RECORDS.path()).args(["golden", "review"]).arg(record);
+        command.arg("--goldens").arg(goldens).args(more);
         let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let mut address = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut address).unwrap();
@@ -201,6 +207,38 @@ fn unusable_goldens_are_shown_with_their_reason() {
     assert!(aogauge(RECORDS.path(), &args).status.success());
     let shown = page(&goldens);
     assert!(shown.contains("cannot be read") && shown.contains("replaces") && shown.contains("classic.4.exr"));
+}
+
+/// The zip that CI keeps is looked at as its folder is; of one that keeps only what goldens are made of, that.
+#[test]
+fn an_archive_is_reviewed_with_what_it_holds() {
+    let dir = tempfile::tempdir().unwrap();
+    let goldens = store(dir.path(), "plane");
+    let page = |review: &Review| {
+        let (status, page) = review.get(&format!("/?token={}", review.token), &format!("127.0.0.1:{}", review.port));
+        assert_eq!(status, 200, "{page}");
+        page.replace(&review.token, "")
+    };
+    let (folder, zip) = (RECORDS.path().join("2"), dir.path().join("a.zip"));
+    zipped(&folder, &zip, "artifact/");
+    let whole = page(&Review::begin(&goldens, &["--all"]));
+    assert!(whole.contains("against Q, what the occluder does") && !whole.contains("The record lacks"));
+    assert!(page(&Review::of(&zip, &goldens, &["--all"])) == whole, "the archive's page is another one");
+
+    let thin = dir.path().join("thin");
+    copied(&folder, &thin);
+    let record: Value = serde_json::from_str(&std::fs::read_to_string(thin.join("record.json")).unwrap()).unwrap();
+    let images = record["scenes"].as_array().unwrap().iter().flat_map(|s| [&s["look"], &s["judge"]["image"]]);
+    let images: Vec<&str> = images.filter_map(Value::as_str).collect();
+    images.iter().for_each(|image| std::fs::remove_file(thin.join(image)).unwrap());
+    zipped(&thin, &zip, "");
+    let review = Review::of(&zip, &goldens, &["--all"]);
+    let shown = page(&review);
+    assert!(shown.contains("against its golden") && !shown.contains("against Q, what the occluder does"));
+    assert!(shown.contains(&format!("The record lacks {} images of the judge or of look views", images.len())));
+    let (status, message) = review.decide("curtain-arcade/classic/cpu/4", "approve", "seen");
+    assert_eq!(status, 200, "{message}");
+    assert_eq!(reasons(&goldens), [pair("curtain-arcade", "seen"), pair("plane", "first")]);
 }
 
 #[test]

@@ -5,6 +5,7 @@ use crate::{
     counted::counted,
     metrics::image::{NonFinite, ScoreName, Scores},
     stats,
+    untrusted::logged,
 };
 
 /// All pairs in a line each with what broke, or all numbers of one.
@@ -18,17 +19,19 @@ pub(super) fn table(found: &Comparison, many: bool) -> String {
 fn single(pair: &PairReport) -> String {
     let mut text = pair.scores.as_ref().map_or_else(String::new, |s| scores(s) + "\n");
     text += &pair.exact.as_ref().map_or_else(String::new, exact);
-    text += &pair.note.as_ref().map_or_else(String::new, |n| format!("note: {n}\n"));
+    text += &pair.note.as_ref().map_or_else(String::new, |n| format!("note: {}\n", logged(n)));
     text += &welch(pair.welch.as_ref());
     if !pair.limits.is_empty() {
         text += &format!("\n{}\n", pair.outcome.label().to_uppercase());
         text += &pair.limits.iter().map(limit).collect::<String>();
     }
-    text + &pair.reason.as_ref().map_or_else(String::new, |r| format!("{r}\n"))
+    text + &pair.reason.as_ref().map_or_else(String::new, |r| logged(r) + "\n")
 }
 
 fn list(found: &Comparison, pairs: &[PairReport]) -> String {
-    let name = |p: &PairReport| p.layer.as_ref().map_or_else(|| p.path.clone(), |l| format!("{} [{l}]", p.path));
+    // Files and layers have the names that others gave them.
+    let name =
+        |p: &PairReport| logged(&p.layer.as_ref().map_or_else(|| p.path.clone(), |l| format!("{} [{l}]", p.path)));
     let width = pairs.iter().map(|p| name(p).chars().count()).max().unwrap_or(0).clamp(5, 60);
     let columns = [ScoreName::Mae, ScoreName::Ssim, ScoreName::Flip];
     let mut text = format!("{:<13}{:<width$} {:>11}", "", "image", "differing");
@@ -48,11 +51,11 @@ fn list(found: &Comparison, pairs: &[PairReport]) -> String {
         }
         text += "\n";
         text += &pair.limits.iter().filter(|l| l.state != LimitState::Holds).map(limit).collect::<String>();
-        text += &pair.reason.as_ref().map_or_else(String::new, |r| format!("    {r}\n"));
-        text += &pair.note.as_ref().map_or_else(String::new, |n| format!("    note: {n}\n"));
+        text += &pair.reason.as_ref().map_or_else(String::new, |r| format!("    {}\n", logged(r)));
+        text += &pair.note.as_ref().map_or_else(String::new, |n| format!("    note: {}\n", logged(n)));
     }
-    text += &found.missing.iter().map(|n| format!("{:<13}{n}\n", "MISSING")).collect::<String>();
-    text += &found.new.iter().map(|n| format!("{:<13}{n}\n", "NEW")).collect::<String>();
+    text += &found.missing.iter().map(|n| format!("{:<13}{}\n", "MISSING", logged(n))).collect::<String>();
+    text += &found.new.iter().map(|n| format!("{:<13}{}\n", "NEW", logged(n))).collect::<String>();
     text + &summary(found)
 }
 
@@ -66,14 +69,14 @@ fn summary(found: &Comparison) -> String {
 }
 
 fn limit(l: &LimitReport) -> String {
-    let value = l.value.map_or_else(|| l.note.clone().unwrap_or_default(), |v| format!("{v:.6}"));
+    let value = l.value.map_or_else(|| logged(l.note.as_deref().unwrap_or_default()), |v| format!("{v:.6}"));
     let state = match (l.state, l.tier) {
         (LimitState::Holds, _) => "holds",
         (LimitState::Broken, Tier::Fail) => "FAIL",
         (LimitState::Broken, Tier::Warn) => "WARN",
         (LimitState::NoValue, _) => "no value",
     };
-    format!("    {state:<9}{:<28} {value}\n", l.limit)
+    format!("    {state:<9}{:<28} {value}\n", logged(&l.limit))
 }
 
 fn exact(found: &Exact) -> String {
@@ -165,7 +168,7 @@ pub(super) fn warnings(found: &Comparison) -> Vec<String> {
     with_scores
         .filter(|(_, n)| n.reference + n.test + n.both > 0)
         .map(|(pair, NonFinite { reference, test, both })| {
-            let of = if several { format!("{}: ", pair.path) } else { String::new() };
+            let of = if several { format!("{}: ", logged(&pair.path)) } else { String::new() };
             format!(
                 "warning: {of}NaN or infinity at {} of the reference alone, {test} of the test image alone and {both} of both; they are left out",
                 counted(reference, "pixel", "pixels")

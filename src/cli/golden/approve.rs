@@ -1,6 +1,6 @@
 //! `aogauge golden approve`
 
-use super::{Exit, Failure, bytes, nothing, notice, print, size::parse, tell};
+use super::{Exit, Failure, bytes, nothing, notice, print_path, size::parse, tell};
 use crate::{
     counted::counted,
     golden::{Approval, ApproveError, Candidates, Limits, Selection, Store, check_golden_name},
@@ -76,7 +76,7 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
         return Err(nothing(&record, &args.only));
     }
     for path in &approved.files {
-        print(&format!("{}\n", path.display()))?;
+        print_path(path)?;
     }
     let (before, after) = (approved.before, approved.after);
     let than = if after < before { "less" } else { "more" };

@@ -4,6 +4,7 @@ use super::{Exit, Failure, Format, bytes, existing, json, pending, print, tell};
 use crate::{
     counted::counted,
     golden::{Entry, VERSION},
+    untrusted::logged,
 };
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -56,30 +57,30 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     Ok(if broken > 0 { Exit::Golden } else { Exit::Pass })
 }
 
+/// A golden a line, and its reason on the next. All of it is others' text.
 fn table(entries: &[Entry]) -> String {
     let row = |e: &Entry| {
-        let rest = match &e.golden {
-            None => format!("UNREADABLE  {}", e.unreadable.as_deref().unwrap_or_default()),
+        let path = e.slot.path().display().to_string();
+        let begin = format!("{path:<48} {:>10}", bytes(e.bytes));
+        match &e.golden {
+            None => logged(&format!("{begin} UNREADABLE  {}", e.unreadable.as_deref().unwrap_or_default())) + "\n",
             Some(about) => {
                 let (of, from) = (&about.identity, &about.provenance);
                 let [width, height] = of.resolution;
                 let tolerance = about.tolerance.as_ref().map_or_else(String::new, |t| format!("  tolerance {t}"));
-                format!(
-                    "{:<11} {:>3} x {:<5} seed {:<6} {} on {}, aogauge {}{tolerance}\n{:60}{}",
+                let line = format!(
+                    "{begin} {:<11} {:>3} x {:<5} seed {:<6} {} on {}, aogauge {}{tolerance}",
                     format!("{width} x {height}"),
                     from.replicates,
                     of.rays,
                     from.seed,
                     from.renderer,
                     from.device,
-                    from.tool,
-                    "",
-                    from.reason
-                )
+                    from.tool
+                );
+                format!("{}\n{:60}{}\n", logged(&line), "", logged(&from.reason))
             }
-        };
-        let path = e.slot.path().display().to_string();
-        format!("{path:<48} {:>10} {rest}\n", bytes(e.bytes))
+        }
     };
     entries.iter().map(row).collect()
 }

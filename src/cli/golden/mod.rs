@@ -13,6 +13,7 @@ use crate::{
     counted::counted,
     golden::{Notice, Outcome, Store, Verification},
     record::Record,
+    untrusted::logged,
 };
 use clap::Subcommand;
 use std::path::Path;
@@ -55,6 +56,11 @@ fn nothing(record: &Record, only: &str) -> Failure {
         }
     };
     Failure { exit: Exit::Nothing, message }
+}
+
+/// Prints a golden's file. Files in a store may have any name.
+fn print_path(path: &Path) -> Result<(), Failure> {
+    print(&(logged(&path.display().to_string()) + "\n"))
 }
 
 /// Says what happens before a store is changed.

@@ -1,6 +1,6 @@
 //! `aogauge golden prune`
 
-use super::{Exit, Failure, notice, pending, print, tell};
+use super::{Exit, Failure, notice, pending, print_path, tell};
 use crate::{
     counted::counted,
     golden::{Candidates, Slot, Store, named_by_record, named_by_suite},
@@ -36,7 +36,7 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     let store = Store::new(&args.goldens);
     let orphans = if args.dry_run { store.orphans(&named)? } else { store.prune(&named, &notice)? };
     for slot in &orphans {
-        print(&format!("{}\n", store.path(slot).display()))?;
+        print_path(&store.path(slot))?;
     }
     if args.dry_run {
         pending(store.is_interrupted()?);

@@ -1,6 +1,6 @@
 //! `aogauge golden remove`
 
-use super::{Exit, Failure, notice, print, tell};
+use super::{Exit, Failure, notice, print_path, tell};
 use crate::{
     counted::counted,
     disk::is_same,
@@ -44,7 +44,7 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
         return Err(Failure { exit: Exit::Golden, message });
     }
     for slot in &slots {
-        print(&format!("{}\n", store.path(slot).display()))?;
+        print_path(&store.path(slot))?;
     }
     tell(&format!("{} removed", counted(slots.len(), "golden", "goldens")));
     Ok(Exit::Pass)

@@ -33,7 +33,7 @@ pub struct Args {
 }
 
 pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
-    let candidates = Candidates::open(&args.record)?;
+    let candidates = Candidates::open_for_review(&args.record)?;
     let review = Review::new(Store::new(&args.goldens), candidates.folder(), &args.only, args.all)?;
     if review.verification().cases.is_empty() {
         return Err(nothing(review.record(), &args.only));

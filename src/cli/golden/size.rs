@@ -1,7 +1,7 @@
 //! `aogauge golden size`
 
 use super::{Exit, Failure, Format, LARGE, bytes, existing, json, pending, print, warn_if_large};
-use crate::golden::VERSION;
+use crate::{golden::VERSION, untrusted::logged};
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::{collections::BTreeMap, path::PathBuf};
@@ -45,7 +45,7 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
         Format::Json => print(&json(&sizes)?)?,
         Format::Text => {
             for (scene, size) in &sizes.scenes {
-                print(&format!("{:>10}  {scene}\n", bytes(*size)))?;
+                print(&format!("{:>10}  {}\n", bytes(*size), logged(scene)))?;
             }
             print(&format!("{:>10}  all\n", bytes(sizes.total)))?;
         }

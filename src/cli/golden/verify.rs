@@ -4,6 +4,7 @@ use super::{Exit, Failure, Format, exit, json, nothing, pending, print, tell};
 use crate::{
     golden::{ALPHA, Candidates, Checked, Stale, Store},
     record::Record,
+    untrusted::logged,
 };
 use std::path::PathBuf;
 
@@ -37,6 +38,8 @@ pub(super) fn execute(args: &Args) -> Result<Exit, Failure> {
     let mut lines: Vec<String> = found.cases.iter().map(Checked::line).collect();
     lines.push(format!("{}; family error {ALPHA}", found.summary()));
     lines.extend(found.stale.as_ref().map(Stale::line));
+    // They tell reasons and errors of others.
+    let lines: Vec<String> = lines.iter().map(|line| logged(line)).collect();
     match args.format {
         Format::Text => print(&(lines.join("\n") + "\n"))?,
         Format::Json => {

@@ -6,6 +6,7 @@ use crate::{
     counted::counted,
     preview,
     scenes::{Material, Mesh, Parameters, Scene, Sky, luminance},
+    untrusted::logged_lines,
 };
 use serde::Serialize;
 use std::path::PathBuf;
@@ -202,7 +203,7 @@ pub fn execute(args: &Args) -> Result<Exit, Failure> {
     };
     print(&match args.format {
         Format::Json => json(&shown)?,
-        Format::Text => shown.text(),
+        Format::Text => logged_lines(&shown.text()),
     })?;
     if let Some(path) = &args.preview {
         preview::write(&scene, args.rays, path)?;

@@ -34,7 +34,8 @@ pub(crate) struct SceneImages<'a> {
     record: &'a Record,
     scene: &'a SceneRecord,
     converged: Layers,
-    look: Layers,
+    /// None where it is not there, in what [`SceneImages::found`] reads.
+    look: Option<Layers>,
     /// Q, NaN where it is too noisy, and its relative standard error.
     q: Option<[Vec<f32>; 2]>,
     /// Which regions a pixel of the measure view lies in; kept when it is first asked for.
@@ -52,9 +53,25 @@ struct Terms<'a> {
 }
 
 impl<'a> SceneImages<'a> {
+    /// All of them.
     pub(crate) fn read(folder: &'a Path, record: &'a Record, scene: &'a SceneRecord) -> Result<Self, ReportError> {
+        Self::wanted(folder, record, scene, &|_| true)
+    }
+
+    /// What there is of them, as in an archive that does not keep the judge's image or that of the look view: pairs
+    /// with those are left out. The scene's own must be there.
+    pub(crate) fn found(folder: &'a Path, record: &'a Record, scene: &'a SceneRecord) -> Result<Self, ReportError> {
+        Self::wanted(folder, record, scene, &|image| folder.join(image).exists())
+    }
+
+    fn wanted(
+        folder: &'a Path,
+        record: &'a Record,
+        scene: &'a SceneRecord,
+        is_wanted: &dyn Fn(&str) -> bool,
+    ) -> Result<Self, ReportError> {
         let read = |image: &str| Layers::read(&folder.join(image));
-        let q = match &scene.judge {
+        let q = match scene.judge.as_ref().filter(|judge| is_wanted(&judge.image)) {
             None => None,
             Some(judge) => {
                 let layers = read(&judge.image)?;
@@ -64,7 +81,7 @@ impl<'a> SceneImages<'a> {
         };
         let converged = read(&scene.image)?;
         fits(&scene.image, converged.resolution, scene.resolution)?;
-        let look = read(&scene.look)?;
+        let look = is_wanted(&scene.look).then(|| read(&scene.look)).transpose()?;
         Ok(SceneImages { folder, record, scene, converged, look, q, regions: None, looked_at: BTreeMap::new() })
     }
 
@@ -223,7 +240,8 @@ impl<'a> SceneImages<'a> {
             true => suite.estimators.iter().find(|e| *e != estimator)?,
             false => &suite.classic,
         };
-        let values = |name: &str| self.look.get(&format!("openness-{name}"));
+        let look = self.look.as_ref()?;
+        let values = |name: &str| look.get(&format!("openness-{name}"));
         let (test, reference) = (values(estimator)?, values(other)?);
         let terms = Terms {
             label: format!("look view, against {other}"),
@@ -231,7 +249,7 @@ impl<'a> SceneImages<'a> {
             limit: LIMIT_METHODS,
             note: "As somebody in the scene sees it.",
         };
-        Some(pair(&terms, self.look.resolution, [test, reference], planes))
+        Some(pair(&terms, look.resolution, [test, reference], planes))
     }
 }
 

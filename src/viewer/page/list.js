@@ -69,16 +69,22 @@ function filtered() {
   else if (stage.item) stage.show(stage.item, decisionOf(stage.item));
 }
 
-function fillFilters() {
+/** A box an outcome that cases have, anew where those change. A filter on one that is gone goes with its box. */
+function fillChips() {
   const counts = {};
   for (const item of data.items) counts[item.outcome] = (counts[item.outcome] ?? 0) + 1;
+  for (const outcome of filters.outcomes) if (!counts[outcome]) filters.outcomes.delete(outcome);
   const chips = Object.keys(OUTCOMES).filter((o) => counts[o]).map((outcome) => {
     const box = el("input", {
-      type: "checkbox", name: "outcome", value: outcome,
+      type: "checkbox", name: "outcome", value: outcome, checked: filters.outcomes.has(outcome),
       change: () => { filters.outcomes[box.checked ? "add" : "delete"](outcome); filtered(); },
     });
     return el("label", { class: `chip ${outcome}` }, box, ` ${OUTCOMES[outcome]} ${counts[outcome]}`);
   });
+  byId("filters").querySelector(".chips").replaceChildren(...chips);
+}
+
+function fillFilters() {
   const choice = (key) => {
     const select = el("select", { name: key, "aria-label": key, change: () => { filters[key] = select.value; filtered(); } },
       el("option", { value: "" }, `every ${key}`), valuesOf(key).map((v) => el("option", { value: v }, v)));
@@ -86,8 +92,9 @@ function fillFilters() {
   };
   const text = el("input", { type: "search", name: "text", placeholder: "name contains … (/)", "aria-label": "Name contains", input: () => { filters.text = text.value; filtered(); } });
   const form = byId("filters");
-  form.replaceChildren(el("div", { class: "chips" }, chips), el("div", { class: "choices" }, ["scene", "estimator", "renderer"].map(choice)), text);
+  form.replaceChildren(el("div", { class: "chips" }), el("div", { class: "choices" }, ["scene", "estimator", "renderer"].map(choice)), text);
   form.addEventListener("submit", (event) => event.preventDefault());
+  fillChips();
 }
 
 /** Scrolls the list, and not the page, to where a row is seen. */

@@ -28,19 +28,21 @@ async function decide(item, decision, reason, status) {
     reason.focus();
     return;
   }
-  status.textContent = "…";
+  // Somebody may have gone to another case meanwhile, and come back.
+  const say = (text) => { (stage.item === item ? byId("decided") : status).textContent = text; };
+  say("…");
   try {
     const answer = await send("decide", { case: item.id, decision, reason: reason.value.trim() });
     const { message, outcome } = await answer.json();
-    status.textContent = message;
+    say(message);
     if (!answer.ok) return;
     decided.set(item.id, message);
     item.outcome = outcome;
-    fillFilters();
+    fillChips();
     fillList();
-    byId("stage").querySelector("h2 .badge").replaceWith(badge(outcome));
+    if (stage.item === item) byId("stage").querySelector("h2 .badge").replaceWith(badge(outcome));
   } catch {
-    status.textContent = "The review has ended: nothing was decided.";
+    say("The review has ended: nothing was decided.");
   }
 }
 
