@@ -138,7 +138,10 @@ impl Method<'_> {
         let known = alone.map(|(judge, value)| Estimate { value, ..judge }).or(error.estimate());
         let clear = known.is_some_and(|e| e.interval(0.95)[0] > 0.0);
         if !clear {
-            return Err(Absent("classic shows no false highlight here that is clear of the noise, so there is nothing to remove".into()));
+            return Err(Absent(
+                "classic shows no false highlight here that is clear of the noise, so there is nothing to remove"
+                    .into(),
+            ));
         }
         let paired: Group = self.rows()?.into_iter().zip(classic.rows()?).map(|(a, b)| [a, b].concat()).collect();
         let errors = |own: &[f64], q: &[f64]| {

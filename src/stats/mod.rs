@@ -241,7 +241,7 @@ mod tests {
                 let e = jackknife(&[group], |m| m[0][0] / m[0][1]);
                 assert_eq!((e.value, e.se), (0.5, 0.0));
             }
-            assert_eq!(welch(&vec![value; 16], &vec![value; 8]).p_two, 1.0);
+            assert_eq!(welch(&[value; 16], &[value; 8]).p_two, 1.0);
         }
         assert!(mean_variance(&[f64::INFINITY, 1.0]).0.is_infinite() && mean_variance(&[]).0.is_nan());
     }

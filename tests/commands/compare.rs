@@ -478,7 +478,8 @@ fn the_test_of_replicates_has_limits() {
             .write(&folder.path().join(name))
             .unwrap();
     };
-    (still("still.exr", 0.5), still("moved.exr", 0.7));
+    still("still.exr", 0.5);
+    still("moved.exr", 0.7);
     for limit in ["welch.rejected<=0", "welch.pixels<=0"] {
         let out = compare(folder.path(), &["still.exr", "moved.exr", "--fail", limit]);
         assert_eq!(out.status.code(), Some(6), "{limit}: {}", text(&out.stdout));

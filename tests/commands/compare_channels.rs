@@ -347,7 +347,8 @@ fn further_pages_and_frames_are_told() {
         writer.write_image_data(&[second; 16]).unwrap();
         writer.finish().unwrap();
     };
-    (frames("a.png", 1), frames("b.png", 200));
+    frames("a.png", 1);
+    frames("b.png", 200);
     DynamicImage::ImageRgb8(picture()).save(at("a.tif")).unwrap();
     let mut tiff = fs::read(at("a.tif")).unwrap();
     let first = u32::from_le_bytes(tiff[4..8].try_into().unwrap()) as usize;
