@@ -125,7 +125,7 @@ fn a_missing_cosine() {
 
 #[test]
 fn a_flipped_normal_on_the_gpu() {
-    let gpu = mistaken("dot(normal, direction) > 0.0), 0u)", "dot(normal, direction) < 0.0), 0u)");
+    let gpu = mistaken("dot(front, direction) > 0.0);", "dot(front, direction) < 0.0);");
     let record = run("corner/classic/gpu", Mistake::None, Some(&gpu));
     assert!(red(&record).contains("GPU and CPU means are equivalent"), "{:?}", red(&record));
 }
