@@ -553,6 +553,12 @@ impl Record {
         self.verdicts.is_empty() && all_excused && !is_first
     }
 
+    /// Whether nothing was judged and no idle gate says so: all gates are on the kit's own judge, and none speaks of the
+    /// images that were handed in.
+    pub(crate) fn judges_no_image(&self) -> bool {
+        self.end() == End::Nothing && self.idle_gates.is_empty()
+    }
+
     /// Text for people: `5 passed, 1 failed, ...`.
     pub fn summary_line(&self) -> String {
         let s = &self.summary;

@@ -178,15 +178,7 @@ impl Files<'_> {
         keep: &mut Keep<'_>,
     ) -> Result<PairReport, CompareError> {
         let region = &settings.region;
-        let further = [
-            ("the reference", read::further(self.reference, bytes.reference)?),
-            ("the test image", read::further(self.test, bytes.test)?),
-        ];
-        let further = further.iter().filter_map(|(of, what)| what.map(|what| format!("{what} of {of}")));
-        let further = further.collect::<Vec<_>>().join("; ");
-        let note = (!further.is_empty() && !bytes.same).then(|| format!("not compared: {further}"));
-        let judged =
-            |exact| PairReport::judged(self.name, None, exact, None, None, &settings.limits).with_note(note.clone());
+        let judged = |exact| PairReport::judged(self.name, None, exact, None, None, &settings.limits);
         if let Some(path) = self.with_layer(settings) {
             return Err(DiskError::content(path, "only OpenEXR images have layers").into());
         }
@@ -207,9 +199,23 @@ impl Files<'_> {
         let weights = region.weights(ours.size, mask)?;
         let weights = weights.as_deref();
         let found = exact(&ours, &theirs, region, weights, settings.tolerance)?;
-        let report = judged(Exact { identical_files: bytes.same, ..found });
+        let report = judged(Exact { identical_files: bytes.same, ..found }).with_note(self.further(bytes)?);
         let stored = [Stored::Samples(&ours), Stored::Samples(&theirs)];
         drawn(report, stored, ours.size, weights, settings, keep)
+    }
+
+    /// What files that differ hold beside the one image that was compared.
+    fn further(&self, bytes: &Bytes<'_>) -> Result<Option<String>, DiskError> {
+        if bytes.same {
+            return Ok(None);
+        }
+        let sides = [
+            ("the reference", read::further(self.reference, bytes.reference)?),
+            ("the test image", read::further(self.test, bytes.test)?),
+        ];
+        let told: Vec<String> =
+            sides.iter().filter_map(|(of, what)| what.map(|what| format!("{what} of {of}"))).collect();
+        Ok((!told.is_empty()).then(|| format!("not compared: {}", told.join("; "))))
     }
 
     /// The same of OpenEXR: all channels of all parts together, unless layers are asked

@@ -5,6 +5,7 @@ use crate::{
     disk::DiskError,
     layers::{Layers, pixel_hash},
     metrics::regions::Region,
+    suite::is_own,
 };
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -109,7 +110,7 @@ impl Golden {
         };
         let renderer = attribute("renderer")?;
         // Other programs draw numbers of their own, whatever seed they are given.
-        let of_image = matches!(renderer.as_str(), "cpu" | "gpu").then_some(seed);
+        let of_image = is_own(&renderer).then_some(seed);
         Ok(Golden {
             identity: Identity {
                 scene: attribute("scene")?,

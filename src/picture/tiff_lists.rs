@@ -28,17 +28,42 @@ impl Numbers<'_> {
     }
 }
 
+/// Where the first directory is.
+struct Directory {
+    /// Its first entry.
+    first: u64,
+    entries: u64,
+    /// Bytes of an entry's counts and places.
+    word: u64,
+}
+
+impl Directory {
+    /// None where the file ends before it begins.
+    fn of(numbers: &Numbers<'_>) -> Option<Self> {
+        let big = numbers.at(2, 2)? == 43;
+        // Places of the first directory, lengths of its count and of an entry's counts.
+        let (place, count, word) = if big { (numbers.at(8, 8)?, 8, 8) } else { (numbers.at(4, 4)?, 2, 4) };
+        Some(Directory { first: place.checked_add(count)?, entries: numbers.at(place, count)?, word })
+    }
+
+    /// The place of an entry, or of what follows the last one.
+    fn entry(&self, i: u64) -> Option<u64> {
+        self.first.checked_add(i.checked_mul(4 + 2 * self.word)?)
+    }
+}
+
+fn numbers(bytes: &[u8]) -> Numbers<'_> {
+    Numbers { bytes, little: bytes.starts_with(b"II") }
+}
+
 /// The tag of the first list that reaches beyond the end of the file. What is cut short
 /// otherwise is left to the decoder.
 pub(super) fn beyond_the_end(bytes: &[u8]) -> Option<u16> {
-    let numbers = Numbers { bytes, little: bytes.starts_with(b"II") };
-    let big = numbers.at(2, 2)? == 43;
-    // Places of the first directory, lengths of its count and of an entry's counts.
-    let (first, count, word) = if big { (numbers.at(8, 8)?, 8, 8) } else { (numbers.at(4, 4)?, 2, 4) };
-    let entries = numbers.at(first, count)?;
-    let size = 4 + 2 * word;
-    for i in 0..entries {
-        let entry = first.checked_add(count)?.checked_add(i.checked_mul(size)?)?;
+    let numbers = numbers(bytes);
+    let directory = Directory::of(&numbers)?;
+    let word = directory.word;
+    for i in 0..directory.entries {
+        let entry = directory.entry(i)?;
         let (tag, kind) = (numbers.at(entry, 2)?, numbers.at(entry + 2, 2)?);
         let length = numbers.at(entry + 4, word)?.saturating_mul(bytes_of(kind as u16));
         let place = numbers.at(entry + 4 + word, word)?;
@@ -51,14 +76,9 @@ pub(super) fn beyond_the_end(bytes: &[u8]) -> Option<u16> {
 
 /// Whether another directory follows the first one.
 pub(super) fn has_further_pages(bytes: &[u8]) -> bool {
-    let numbers = Numbers { bytes, little: bytes.starts_with(b"II") };
-    let next = || {
-        let big = numbers.at(2, 2)? == 43;
-        let (first, count, word) = if big { (numbers.at(8, 8)?, 8, 8) } else { (numbers.at(4, 4)?, 2, 4) };
-        let entries = numbers.at(first, count)?.checked_mul(4 + 2 * word)?;
-        numbers.at(first.checked_add(count)?.checked_add(entries)?, word)
-    };
-    next().is_some_and(|next| next != 0)
+    let numbers = numbers(bytes);
+    let next = Directory::of(&numbers).and_then(|d| numbers.at(d.entry(d.entries)?, d.word));
+    next.is_some_and(|next| next != 0)
 }
 
 #[cfg(test)]

@@ -59,7 +59,7 @@ fn of_run(record: &Record) -> TestSuite {
     let complete = record.incomplete.as_ref().map(|why| error("incomplete", why));
     let mut tests = vec![TestCase::new("the run is complete", complete.unwrap_or_else(TestCaseStatus::success))];
     let excuse = record.end() != End::Nothing;
-    if !excuse && record.idle_gates.is_empty() {
+    if record.judges_no_image() {
         let nothing = failure("inconclusive", "no gate speaks of the images that were handed in", &[]);
         tests.push(TestCase::new("gates are held against the images", nothing));
     }

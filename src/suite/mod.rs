@@ -9,6 +9,7 @@ mod renderer;
 pub use estimator::EstimatorFile;
 pub use file::{JudgeSettings, Rays, Replicates, SoftwareAdapter, SuiteFile};
 pub use gate::{GateFile, LimitFile};
+pub(crate) use plan::is_own;
 pub use plan::{Case, Plan, Platform};
 pub use renderer::{EnvironmentFile, OwnRenderer, RendererFile, is_taken};
 

@@ -31,6 +31,11 @@ pub struct Case {
     pub rays: u32,
 }
 
+/// Whether a renderer of this name is one of ours.
+pub(crate) fn is_own(renderer: &str) -> bool {
+    matches!(renderer, "cpu" | "gpu")
+}
+
 impl Case {
     /// `scene/estimator/renderer/rays`, unique in a run.
     pub fn id(&self) -> String {
@@ -39,7 +44,7 @@ impl Case {
 
     /// Whether a program of somebody else renders it.
     pub fn is_external(&self) -> bool {
-        !matches!(self.renderer.as_str(), "cpu" | "gpu")
+        !is_own(&self.renderer)
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::{
     counted::counted,
     gate::{Outcome, Verdict},
-    record::{End, Record},
+    record::Record,
     report::{errors, in_a_line, table::margin},
     untrusted::{cut, line},
 };
@@ -103,7 +103,7 @@ fn all(record: &Record) -> Vec<Annotation> {
         let (level, word) = if g.excused { (Level::Notice, "Not run") } else { (Level::Warning, "Inconclusive") };
         Annotation::new(level, format!("{word}: {}", g.gate), format!("Nothing was held against it: {}", g.reason))
     });
-    let nothing = (record.end() == End::Nothing && record.idle_gates.is_empty()).then(|| {
+    let nothing = record.judges_no_image().then(|| {
         Annotation::new(
             Level::Warning,
             "Inconclusive: nothing judged",
